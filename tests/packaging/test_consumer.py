@@ -80,7 +80,7 @@ def test_an_older_hamotor_is_refused(tools: Path, tmp_path: Path) -> None:
     project = tmp_path / "wants_more"
     project.mkdir()
     (project / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.23)\n"
+        "cmake_minimum_required(VERSION 3.22)\n"
         "project(wants_more LANGUAGES CXX)\n"
         "find_package(hamotor 99.0)\n"
         'if(hamotor_FOUND)\n  message(FATAL_ERROR "took an older one")\nendif()\n'

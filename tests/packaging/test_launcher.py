@@ -319,6 +319,13 @@ def test_a_python_without_venv_asks_for_the_package(fresh: Clone) -> None:
     assert answer.stderr.splitlines()[-1].endswith("apt-get install -y python3.12-venv")
 
 
+def test_a_bare_machine_is_told_everything_in_one_line(fresh: Clone) -> None:
+    fresh.add_tool("apt-get", "exit 100")
+    answer = fresh.call("run", "tumble", HAMOTOR_PYTHON="", HAMOTOR_NO_APT="1")
+    assert answer.returncode == 4
+    assert answer.stderr.splitlines()[-1].endswith("install -y g++ python3 python3-venv")
+
+
 def test_a_clone_that_cannot_be_written_is_a_clear_error(fresh: Clone) -> None:
     (fresh.root / ".hamotor").touch()
     answer = fresh.call("list")
