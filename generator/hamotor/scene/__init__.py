@@ -1,0 +1,29 @@
+"""Scenes: from a TOML file to a typed, checked `Scene`, and to its C++ source."""
+
+from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.groups import GROUPS, Group
+from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.model import Body, Output, Scene, Time
+from hamotor.scene.principal import PrincipalFrame
+from hamotor.scene.reading import bundled_scenes, parse_scene, read_scene
+from hamotor.scene.schema import METHODS, scene_reference, starter_scene
+
+__all__ = [
+    "GROUPS",
+    "METHODS",
+    "Body",
+    "ConservedQuantity",
+    "Gravity",
+    "Group",
+    "Interaction",
+    "Output",
+    "PrincipalFrame",
+    "Scene",
+    "Spring",
+    "Time",
+    "bundled_scenes",
+    "parse_scene",
+    "read_scene",
+    "scene_reference",
+    "starter_scene",
+]

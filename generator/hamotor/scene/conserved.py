@@ -1,0 +1,280 @@
+"""Which quantities a scene conserves, found exactly from what acts in it.
+
+The total spatial momentum pairs with a Lie algebra element ζ = (ω, v), the velocity field
+x ↦ v + ω×x of the world, to ω·L + v·P (about the world's origin). By Noether's theorem it is
+conserved if ζ leaves every potential as it is:
+
+* gravity g:                  g·v = 0 and ω×g = 0
+* a spring to the anchor A:   v + ω×A = 0
+* a spring between bodies:    nothing to demand
+
+With a fixed point (SO3) each body's momentum is taken about its own fixed point P, and v follows
+from ω. Gravity demands ω×g = 0 unless the centre of mass is P, a spring to A demands ω×(A - P) = 0,
+and one between bodies ω×(P' - P) = 0; a spring that is tied to P itself never acts.
+
+The space of such ζ is computed in rational arithmetic from the decimals of the scene. Each
+interaction is asked to be invariant by itself, so that a symmetry which only the sum of several
+potentials has is not found.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hamotor.scene.exact import decimal
+from hamotor.scene.interactions import Gravity, Spring
+
+if TYPE_CHECKING:
+    from hamotor.scene.model import Body, Scene
+
+Row = list[Fraction]
+
+
+@dataclass(frozen=True)
+class ConservedQuantity:
+    """A quantity that the exact motion keeps constant."""
+
+    name: str
+    """Of its column: `energy`, `spatial_momentum.e12`, `NAME.casimir.p_squared`."""
+    unit: str
+    description: str
+    """In words; a linear combination is spelled out."""
+    coefficients: tuple[tuple[str, float], ...]
+    """A spatial momentum as a combination of the group's generators; otherwise empty."""
+    body: str
+    """The body whose Casimir it is; otherwise ""."""
+    norm: tuple[str, ...]
+    """Columns whose initial Euclidean norm is the scale of its relative error; may be empty."""
+    scale: float
+    """That scale in the scene's own initial state; 0 where the quantity has no natural scale."""
+
+
+def reduced_echelon(rows: Sequence[Sequence[Fraction]], columns: int) -> list[Row]:
+    """The reduced row echelon form, zero rows dropped."""
+    remaining = [list(row) for row in rows]
+    reduced: list[Row] = []
+    for column in range(columns):
+        pivot = next((row for row in remaining if row[column] != 0), None)
+        if pivot is None:
+            continue
+        remaining = [row for row in remaining if row is not pivot]
+        pivot = [x / pivot[column] for x in pivot]
+
+        def cleared(row: Row, pivot: Row = pivot, column: int = column) -> Row:
+            return [x - row[column] * p for x, p in zip(row, pivot, strict=True)]
+
+        remaining = [cleared(row) for row in remaining]
+        reduced = [cleared(row) for row in reduced] + [pivot]
+    return reduced
+
+
+def null_space(rows: Sequence[Sequence[Fraction]], columns: int) -> list[Row]:
+    """All x with rows·x = 0: a basis in reduced echelon form."""
+    reduced = reduced_echelon(rows, columns)
+    pivots = [next(k for k in range(columns) if row[k] != 0) for row in reduced]
+    basis = []
+    for free in (k for k in range(columns) if k not in pivots):
+        vector = [Fraction(0)] * columns
+        vector[free] = Fraction(1)
+        for row, pivot in zip(reduced, pivots, strict=True):
+            vector[pivot] = -row[free]
+        basis.append(vector)
+    return reduced_echelon(basis, columns)
+
+
+def _cross_with(a: Sequence[Fraction]) -> list[Row]:
+    """The rows of ω ↦ ω×a."""
+    a1, a2, a3 = a
+    zero = Fraction(0)
+    return [[zero, a3, -a2], [-a3, zero, a1], [a2, -a1, zero]]
+
+
+def _difference(a: Sequence[float], b: Sequence[float]) -> Row:
+    return [decimal(x) - decimal(y) for x, y in zip(a, b, strict=True)]
+
+
+def _demands_on_motions(scene: Scene) -> list[Row]:
+    """The linear conditions on ζ = (ω, v), or (w12, v1, v2) in the plane."""
+    zero, one = Fraction(0), Fraction(1)
+    rows: list[Row] = []
+    for interaction in scene.interactions:
+        if isinstance(interaction, Gravity):
+            g = [decimal(x) for x in interaction.acceleration]
+            if not any(g):
+                continue
+            if scene.group.dimension == 2:
+                rows += [[one, zero, zero], [zero, *g]]
+            else:
+                rows += [[*row, zero, zero, zero] for row in _cross_with(g)]
+                rows.append([zero, zero, zero, *g])
+        elif interaction.anchor is not None:
+            a = [decimal(x) for x in interaction.anchor]
+            if scene.group.dimension == 2:
+                rows += [[-a[1], one, zero], [a[0], zero, one]]
+            else:
+                for k, row in enumerate(_cross_with(a)):
+                    rows.append([*row, *(one if k == j else zero for j in range(3))])
+    return rows
+
+
+def _demands_on_rotations(scene: Scene) -> list[Row]:
+    """The linear conditions on ω where every body has a fixed point."""
+    bodies = {body.name: body for body in scene.bodies}
+    rows: list[Row] = []
+    for interaction in scene.interactions:
+        if isinstance(interaction, Gravity):
+            if any(any(body.center_of_mass) for body in scene.bodies):
+                rows += _cross_with([decimal(x) for x in interaction.acceleration])
+            continue
+        ends = [(bodies[interaction.body].position, any(interaction.at))]
+        if interaction.other is None:
+            ends.append((interaction.anchor or (), False))
+        else:
+            ends.append((bodies[interaction.other].position, any(interaction.other_at or ())))
+        if any(moves for _, moves in ends):
+            rows += _cross_with(_difference(ends[0][0], ends[1][0]))
+    return rows
+
+
+def is_free(scene: Scene, body: Body) -> bool:
+    """Whether nothing acts on `body`, so that its momentum stays on one coadjoint orbit."""
+    for interaction in scene.interactions:
+        if isinstance(interaction, Spring):
+            if body.name not in (interaction.body, interaction.other):
+                continue
+            at = interaction.at if body.name == interaction.body else interaction.other_at
+            if scene.group.translates or any(at or ()):
+                return False
+        elif any(interaction.acceleration) and (scene.group.translates or any(body.center_of_mass)):
+            return False
+    return True
+
+
+def conserved_quantities(scene: Scene) -> tuple[ConservedQuantity, ...]:
+    """Energy, the conserved components of the total spatial momentum, Casimirs of free bodies."""
+    return (_energy(scene), *_momenta(scene), *_casimirs(scene))
+
+
+def _energy(scene: Scene) -> ConservedQuantity:
+    kinetic, potential, magnitude = scene.initial_energy
+    total = kinetic + potential
+    vanishes = abs(total) <= 1e-9 * magnitude
+    return ConservedQuantity(
+        name="energy",
+        unit="J",
+        description="kinetic and potential energy of all bodies",
+        coefficients=(),
+        body="",
+        norm=() if vanishes else ("energy",),
+        scale=magnitude if vanishes else abs(total),
+    )
+
+
+def _momenta(scene: Scene) -> list[ConservedQuantity]:
+    group = scene.group
+    demands = _demands_on_motions(scene) if group.translates else _demands_on_rotations(scene)
+    spatial = dict(zip(group.generators, scene.initial_spatial_momentum, strict=True))
+    quantities = []
+    for element in null_space(demands, len(group.generators)):
+        terms = [(g, x) for g, x in zip(group.generators, element, strict=True) if x != 0]
+        leading = terms[0][0]
+        angular = leading in group.generators[: group.rotations]
+        rotations, translations = (
+            group.generators[: group.rotations],
+            group.generators[group.rotations :],
+        )
+        alike = rotations if angular else translations
+        suffix, description = _reading_of(scene, element, terms)
+        quantities.append(
+            ConservedQuantity(
+                name=f"spatial_momentum.{leading}{suffix}",
+                unit="kg m^2/s" if angular else "kg m/s",
+                description=description,
+                coefficients=tuple((g, float(x)) for g, x in terms),
+                body="",
+                norm=tuple(f"spatial_momentum.{g}" for g in alike),
+                scale=float(np.linalg.norm([spatial[g] for g in alike])),
+            )
+        )
+    return quantities
+
+
+def _reading_of(scene: Scene, element: Row, terms: list[tuple[str, Fraction]]) -> tuple[str, str]:
+    """The name's suffix and the words for one conserved combination."""
+    group = scene.group
+    origin = "the world's origin" if group.translates else "the fixed point"
+    if len(terms) == 1:
+        generator = terms[0][0]
+        if generator in group.generators[: group.rotations]:
+            return "", f"total angular momentum {generator} about {origin}, world frame"
+        return "", f"total linear momentum along e{generator[-1]}, world frame"
+    spelled = _spelled(terms)
+    omega, v = element[: group.rotations], element[group.rotations :]
+    one_rotation = sum(1 for w in omega if w != 0) == 1
+    if one_rotation and group.dimension == 2:
+        through = [-v[1], v[0]]  # v = -ω×A with ω = 1
+        return "_about_axis", f"{spelled}: angular momentum about {_point(through)}"
+    if one_rotation and group.translates:
+        k = next(i for i, w in enumerate(omega) if w != 0)
+        if v[k] == 0:
+            i, j = (k + 1) % 3, (k + 2) % 3
+            through = [Fraction(0)] * 3
+            through[i], through[j] = -v[j], v[i]
+            return "_about_axis", (
+                f"{spelled}: angular momentum about the axis along e{k + 1} through"
+                f" {_point(through)}"
+            )
+    return "_combination", f"{spelled}, total over the bodies, world frame"
+
+
+def _spelled(terms: list[tuple[str, Fraction]]) -> str:
+    text = terms[0][0]
+    for generator, x in terms[1:]:
+        factor = "" if abs(x) == 1 else f"{float(abs(x)):.12g}*"
+        text += f" {'-' if x < 0 else '+'} {factor}{generator}"
+    return text
+
+
+def _point(coordinates: Sequence[Fraction]) -> str:
+    return "(" + ", ".join(f"{float(x):.12g}" for x in coordinates) + ")"
+
+
+def _casimirs(scene: Scene) -> list[ConservedQuantity]:
+    """Functions of a momentum that no Hamiltonian of a free body can change (theory.md §5)."""
+    group = scene.group
+    quantities = []
+    for body in scene.bodies:
+        if not is_free(scene, body):
+            continue
+        angular = np.array(body.momentum[: group.rotations])
+        linear = np.array(body.momentum[group.rotations :])
+        if not group.translates:
+            values = [("pi_squared", "kg^2 m^4/s^2", "|π|²", float(angular @ angular), 0.0)]
+        else:
+            values = [("p_squared", "kg^2 m^2/s^2", "|p|²", float(linear @ linear), 0.0)]
+            if group.dimension == 3:
+                magnitude = math.sqrt(float(angular @ angular) * float(linear @ linear))
+                values.append(
+                    ("p_dot_pi", "kg^2 m^3/s^2", "p·π", float(linear @ angular), magnitude)
+                )
+        for name, unit, formula, value, magnitude in values:
+            column = f"{body.name}.casimir.{name}"
+            vanishes = abs(value) <= 1e-9 * magnitude
+            quantities.append(
+                ConservedQuantity(
+                    name=column,
+                    unit=unit,
+                    description=f"{formula} of {body.name}, on which nothing acts",
+                    coefficients=(),
+                    body=body.name,
+                    norm=() if vanishes else (column,),
+                    scale=magnitude if vanishes else abs(value),
+                )
+            )
+    return quantities

@@ -1,0 +1,209 @@
+"""A scene as a frozen value: what the TOML says, checked and in one form."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.scene import inertia
+from hamotor.scene.conserved import ConservedQuantity, conserved_quantities
+from hamotor.scene.exact import decimal
+from hamotor.scene.groups import Group
+from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.motors import Matrix, Vector, cross, motor_of, rotation_matrix
+from hamotor.scene.principal import PrincipalFrame, principal_frame
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body: its mass distribution, where it starts and with what momentum.
+
+    Quantities of the body are components in the user's body frame.
+    """
+
+    name: str
+    group: Group
+    mass: float
+    """kg."""
+    inertia: Matrix
+    """Tensor about the centre of mass, kg m²: (3, 3), or (1, 1) in the plane."""
+    center_of_mass: Vector
+    """m."""
+    position: Vector
+    """Of the body frame's origin in the world at the start, m."""
+    rotor: Vector
+    """Orientation at the start, body to world: (s, e23, e31, e12), in the plane (s, e12)."""
+    momentum: Vector
+    """At the start, about the body frame's origin: angular (kg m²/s), then linear (kg m/s)."""
+
+    @cached_property
+    def kinetic_matrix(self) -> NDArray[np.float64]:
+        """K: momentum = K·(Ω, V), rotations first. Symmetric positive definite, (dim g, dim g)."""
+        return inertia.kinetic_matrix(
+            self.mass, self.center_of_mass, self.inertia, translates=self.group.translates
+        )
+
+    @cached_property
+    def principal(self) -> PrincipalFrame:
+        """The frame in which K is diagonal."""
+        return principal_frame(
+            self.mass, self.center_of_mass, self.inertia, translates=self.group.translates
+        )
+
+    @cached_property
+    def motor(self) -> Vector:
+        """M at the start, X_world = M X_body M~, in the order of `group.motor`.
+
+        With a fixed point the world frame is the one translated there: the rotor alone.
+        """
+        return motor_of(self.position, self.rotor) if self.group.translates else self.rotor
+
+    @property
+    def rate(self) -> NDArray[np.float64]:
+        """(Ω, V) at the start, body frame, rad/s and m/s: K⁻¹ applied in the principal frame."""
+        frame = self.principal
+        angular = np.array(self.momentum[: self.group.rotations])
+        linear = np.array(self.momentum[self.group.rotations :])
+        center = frame.center
+        if self.group.translates:
+            angular = angular - cross(center, linear)
+        moments = np.array(frame.moments)
+        if self.group.dimension == 2:
+            rotation = angular / moments
+            return np.concatenate(
+                [rotation, linear / self.mass - rotation * (-center[1], center[0])]
+            )
+        rotation = frame.axes @ ((frame.axes.T @ angular) / moments)
+        if not self.group.translates:
+            return np.asarray(rotation)
+        return np.concatenate([rotation, linear / self.mass - cross(rotation, center)])
+
+    def in_world(self, point: Vector) -> NDArray[np.float64]:
+        """Where a point of the body frame is in the world at the start, m."""
+        return np.asarray(rotation_matrix(self.rotor) @ np.array(point) + np.array(self.position))
+
+
+@dataclass(frozen=True)
+class Time:
+    """How far, how finely and how a scene is integrated."""
+
+    end: float
+    """s."""
+    step: float | None
+    """Of a fixed step, s; None where a tolerance is given."""
+    tolerance: float | None
+    """Of the final state: halving the step changes it by no more. None where a step is given."""
+    method: str
+    """`auto`, or a method's name."""
+
+
+@dataclass(frozen=True)
+class Output:
+    """What of a run is recorded."""
+
+    every: int
+    """Every how many steps a row is written."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Bodies on a group, what acts on them, and how to integrate them."""
+
+    name: str
+    """The file's stem, made an identifier."""
+    description: str
+    group: Group
+    bodies: tuple[Body, ...]
+    interactions: tuple[Interaction, ...]
+    time: Time
+    output: Output
+    sha256: str
+    """Of the file's bytes, hexadecimal."""
+
+    @property
+    def algebra(self) -> str:
+        """The algebra's name."""
+        return self.group.algebra
+
+    @cached_property
+    def initial_state(self) -> NDArray[np.float64]:
+        """Per body its motor's and then its momentum's components, in the user's body frame."""
+        return np.array([x for body in self.bodies for x in (*body.motor, *body.momentum)])
+
+    @property
+    def principal(self) -> tuple[PrincipalFrame, ...]:
+        """The principal frame of each body."""
+        return tuple(body.principal for body in self.bodies)
+
+    @cached_property
+    def conserved(self) -> tuple[ConservedQuantity, ...]:
+        """What the exact motion keeps constant: energy, momenta by symmetry, Casimirs."""
+        return conserved_quantities(self)
+
+    @property
+    def gravity(self) -> Vector | None:
+        """The sum of all gravities, world frame, m/s²; None where it vanishes."""
+        fields = [i.acceleration for i in self.interactions if isinstance(i, Gravity)]
+        total = tuple(float(sum(map(decimal, g))) for g in zip(*fields, strict=True))
+        return total if any(total) else None
+
+    @property
+    def springs(self) -> tuple[Spring, ...]:
+        """The springs, in the scene's order."""
+        return tuple(i for i in self.interactions if isinstance(i, Spring))
+
+    def body(self, name: str) -> Body:
+        """The body called `name` (KeyError if there is none)."""
+        for body in self.bodies:
+            if body.name == name:
+                return body
+        raise KeyError(name)
+
+    def spring_vector(self, spring: Spring) -> NDArray[np.float64]:
+        """From a spring's far end to its point on `spring.body` at the start, world frame, m."""
+        near = self.body(spring.body).in_world(spring.at)
+        if spring.other is None:
+            return np.asarray(near - np.array(spring.anchor))
+        return near - self.body(spring.other).in_world(spring.other_at or ())
+
+    @cached_property
+    def initial_energy(self) -> tuple[float, float, float]:
+        """Kinetic energy, potential energy, and the sum of all terms' magnitudes, J, at the start.
+
+        The potential of gravity is measured from the world's origin, with a fixed point from there.
+        """
+        kinetic = sum(0.5 * float(np.array(b.momentum) @ b.rate) for b in self.bodies)
+        potentials = []
+        if self.gravity is not None:
+            for body in self.bodies:
+                height = body.in_world(body.center_of_mass)
+                if not self.group.translates:
+                    height = height - np.array(body.position)
+                potentials.append(-body.mass * float(np.array(self.gravity) @ height))
+        for spring in self.springs:
+            length = float(np.linalg.norm(self.spring_vector(spring)))
+            potentials.append(0.5 * spring.stiffness * (length - spring.rest_length) ** 2)
+        return kinetic, sum(potentials), kinetic + sum(abs(u) for u in potentials)
+
+    @cached_property
+    def initial_spatial_momentum(self) -> Vector:
+        """The total momentum in the world frame, in the order of `group.generators`.
+
+        Angular momenta are taken about the world's origin, with a fixed point about that point.
+        """
+        total = np.zeros(len(self.group.generators))
+        rotations = self.group.rotations
+        for body in self.bodies:
+            rotation = rotation_matrix(body.rotor)
+            angular = np.array(body.momentum[:rotations])
+            if self.group.dimension == 3:
+                angular = rotation @ angular
+            if self.group.translates:
+                linear = rotation @ np.array(body.momentum[rotations:])
+                total[rotations:] += linear
+                angular = angular + cross(body.position, linear)
+            total[:rotations] += angular
+        return tuple(float(x) for x in total)

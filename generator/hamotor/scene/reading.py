@@ -1,0 +1,405 @@
+"""From a scene's name or file to a checked Scene. Every mistake is one UsageError."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import os
+import re
+import stat
+import tomllib
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from hamotor.errors import UsageError, suggest
+from hamotor.scene import inertia, schema
+from hamotor.scene.groups import ALGEBRAS, groups_of
+from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.model import Body, Output, Scene, Time
+from hamotor.scene.motors import (
+    Matrix,
+    Vector,
+    quaternion_of_matrix,
+    rotor_of_angle,
+    rotor_of_axis_angle,
+    rotor_of_quaternion,
+)
+from hamotor.scene.table import Table, listed, quoted
+
+BUNDLED = Path(__file__).resolve().parents[2] / "scenes"
+UNIT_TOLERANCE = 1e-6
+"""How far a quaternion's norm or a matrix's R Rᵀ may be from 1: seven written digits suffice."""
+MOST_KEY_PARTS = 16
+
+
+def bundled_scenes() -> list[tuple[str, str]]:
+    """The bundled scenes' names with their one-line descriptions, by name."""
+    return [(path.stem, read_scene(path).description) for path in sorted(BUNDLED.glob("*.toml"))]
+
+
+def read_scene(scene: str | os.PathLike[str]) -> Scene:
+    """The bundled scene of this name, or the scene in the file at this path.
+
+    A bundled scene's name comes first; write ./NAME for a file that is called the same. UsageError
+    for anything unreadable, larger than 1 MiB, not UTF-8, not TOML, or wrong.
+    """
+    shown = os.fspath(scene)
+    path = Path(shown)
+    if isinstance(scene, str) and re.fullmatch(schema.NAME_PATTERN, scene):
+        bundled = sorted(file.stem for file in BUNDLED.glob("*.toml"))
+        if scene in bundled:
+            path, shown = BUNDLED / f"{scene}.toml", f"{scene}.toml"
+        elif not path.exists():
+            raise UsageError(
+                f"{quoted(scene)} is neither a bundled scene nor a file; bundled scenes are"
+                f" {listed(bundled)}.{suggest(scene, bundled)}"
+            )
+    shown = shown if shown.isprintable() else quoted(shown)
+    return parse_scene(_contents(path, shown), name=path.stem, file=shown)
+
+
+def _contents(path: Path, shown: str) -> bytes:
+    """The bytes of a regular file of at most 1 MiB. Opening never blocks."""
+
+    def refuse(why: str) -> NoReturn:
+        raise UsageError(f"{shown}: {why}")
+
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    except FileNotFoundError:
+        refuse("there is no such file")
+    except (OSError, ValueError) as error:
+        refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}")
+    with os.fdopen(descriptor, "rb") as file:
+        status = os.fstat(descriptor)
+        if stat.S_ISDIR(status.st_mode):
+            refuse("is a directory; give the scene's TOML file in it")
+        if not stat.S_ISREG(status.st_mode):
+            refuse("is not a regular file; a scene is a TOML file")
+        try:
+            contents = (
+                file.read(schema.MOST_BYTES + 1) if (status.st_size <= schema.MOST_BYTES) else None
+            )
+        except OSError as error:
+            refuse(f"cannot be read: {error.strerror}")
+    if contents is None or len(contents) > schema.MOST_BYTES:
+        refuse(f"is larger than the {schema.MOST_BYTES >> 20} MiB that a scene may have")
+    return contents
+
+
+def parse_scene(contents: bytes, *, name: str, file: str) -> Scene:
+    """The scene that a TOML file holds; `file` is how messages call it.
+
+    `name` becomes the scene's, with every character that a name cannot have as an underscore.
+    """
+    values = _toml(contents, file)
+    top = Table(file, "", values, schema.SCENE, groups_of(ALGEBRAS[0])[0])
+    algebra = top.choice("algebra", ALGEBRAS, "algebras")
+    groups = {group.name: group for group in groups_of(algebra)}
+    group = next(iter(groups.values()))
+    if top.has("group"):
+        group = groups[top.choice("group", list(groups), f"groups of {algebra}")]
+    top = Table(file, "", values, schema.SCENE, group)
+    top.refuse_unknown_keys()
+    limits = top.table("limits", schema.LIMITS, heading=True)
+    bodies = _bodies(top, limits.integer("bodies"))
+    scene = Scene(
+        name=_identifier(name),
+        description=top.text("description"),
+        group=group,
+        bodies=bodies,
+        interactions=_interactions(top, bodies, limits.integer("interactions")),
+        time=_time(top.table("time", schema.TIME, heading=True)),
+        output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
+        sha256=hashlib.sha256(contents).hexdigest(),
+    )
+    _refuse_singular_springs(top, scene)
+    with np.errstate(all="ignore"):
+        if not math.isfinite(sum(scene.initial_energy)):
+            top.fail("the energy at the start overflows; choose other units or smaller numbers")
+    return scene
+
+
+def _identifier(name: str) -> str:
+    identifier = re.sub(r"[^A-Za-z0-9_]", "_", name)[:64]
+    return identifier if re.match(r"[A-Za-z]", identifier) else f"scene_{identifier}"
+
+
+_LONG_KEY = re.compile(
+    r"""(?<![A-Za-z0-9_-])(?:(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+)"""
+    f"{{{MOST_KEY_PARTS}}}"
+)
+
+
+def _toml(contents: bytes, file: str) -> dict[str, Any]:
+    try:
+        text = contents.decode("utf-8")
+    except UnicodeDecodeError as error:
+        line = contents.count(b"\n", 0, error.start) + 1
+        raise UsageError(f"{file}: line {line}: is not UTF-8 text") from None
+    # A dotted key of n parts costs the TOML reader n² time and memory.
+    if long_key := _LONG_KEY.search(text):
+        line = text.count("\n", 0, long_key.start()) + 1
+        raise UsageError(f"{file}: line {line}: a key of more than {MOST_KEY_PARTS} parts")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise UsageError(f"{file}: is not valid TOML: brackets are nested too deeply") from None
+    except ValueError as error:
+        end = f"at line {text.count(chr(10)) + 1}, the end of the document"
+        problem = str(error).replace("at end of document", end)
+        if "line" not in problem:
+            problem = "a number of thousands of digits"
+        raise UsageError(f"{file}: is not valid TOML: {_printable(problem)}") from None
+
+
+def _printable(text: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in text)[:200]
+
+
+def _bodies(top: Table, most: int) -> tuple[Body, ...]:
+    tables = top.tables("body") if top.has("body") else []
+    if not tables:
+        top.fail("a scene needs at least one [[body]]")
+    if len(tables) > most:
+        top.fail(
+            f"{len(tables)} bodies are more than the {most} allowed;"
+            f" allow more with [limits] bodies = {len(tables)}"
+        )
+    bodies: list[Body] = []
+    for number, values in enumerate(tables, 1):
+        body = _body(Table(top.file, f"body {number}", values, schema.BODY, top.group))
+        if any(body.name == other.name for other in bodies):
+            first = next(k for k, other in enumerate(bodies, 1) if other.name == body.name)
+            top.fail(f'body {number}: name: "{body.name}" is the name of body {first} already')
+        bodies.append(body)
+    return tuple(bodies)
+
+
+def _body(table: Table) -> Body:
+    table.refuse_unknown_keys()
+    name = table.name("name")
+    table = Table(table.file, f'{table.place} "{name}"', table.values, table.section, table.group)
+    mass, center, tensor = _mass_distribution(table)
+    if table.has("momentum"):
+        for key in ("velocity", "angular_velocity"):
+            if table.has(key):
+                table.fail(f'"momentum" and "{key}" contradict each other; give one')
+        given = table.table("momentum", schema.MOMENTUM)
+        linear = given.vector("linear") if table.group.translates else ()
+        momentum = (*given.rotation("angular"), *linear)
+    else:
+        velocity = table.vector("velocity") if table.group.translates else None
+        momentum = inertia.momentum(
+            mass, center, tensor, table.rotation("angular_velocity"), velocity
+        )
+    return Body(
+        name=name,
+        group=table.group,
+        mass=mass,
+        inertia=tensor,
+        center_of_mass=center,
+        position=table.vector("position"),
+        rotor=_orientation(table),
+        momentum=momentum,
+    )
+
+
+def _mass_distribution(table: Table) -> tuple[float, Vector, Matrix]:
+    """Mass, centre of mass and the tensor about it, checked to be physical."""
+    source = table.one_of("inertia", "box", "ellipsoid", "cylinder", "disk", "points")
+    if source == "points":
+        for key in ("mass", "center_of_mass"):
+            if table.has(key):
+                table.fail(f'"points" and "{key}" contradict each other: "{key}" follows from them')
+        mass, center, tensor = inertia.of_points(_points(table))
+    else:
+        mass, center = table.number("mass"), table.vector("center_of_mass")
+        tensor = _tensor(table, source, mass)
+    if mistake := inertia.mistake_in_tensor(tensor):
+        table.fail(mistake, source)
+    kinetic = inertia.kinetic_matrix(mass, center, tensor, translates=table.group.translates)
+    about = tensor if table.group.translates else kinetic
+    if (axis := inertia.vanishing_axis(np.array(about))) is not None:
+        where = "its centre of mass" if table.group.translates else "the fixed point"
+        if len(axis) == 3:
+            where = f"the axis ({', '.join(f'{x + 0.0:.4g}' for x in axis)}) through {where}"
+        table.fail(
+            f"the body has no moment of inertia about {where}, so that its momentum cannot tell"
+            " how fast it turns; give it some thickness",
+            source,
+        )
+    return mass, center, tensor
+
+
+def _points(table: Table) -> list[tuple[float, Vector]]:
+    points = []
+    for number, values in enumerate(table.tables("points"), 1):
+        place = f"{table.place}: points: point {number}"
+        point = Table(table.file, place, values, schema.POINT, table.group)
+        point.refuse_unknown_keys()
+        points.append((point.number("mass"), point.vector("at")))
+    if not points:
+        table.fail("needs at least one point", "points")
+    return points
+
+
+def _tensor(table: Table, source: str, mass: float) -> Matrix:
+    if source == "box":
+        return inertia.box(mass, table.lengths("box"))
+    if source == "ellipsoid":
+        return inertia.ellipsoid(mass, table.lengths("ellipsoid"))
+    if source == "disk":
+        return inertia.disk(mass, table.number("disk"))
+    if source == "cylinder":
+        cylinder = table.table("cylinder", schema.CYLINDER)
+        return inertia.cylinder(mass, cylinder.number("radius"), cylinder.number("height"))
+    if table.group.dimension == 2:
+        return ((table.number("inertia"),),)
+    value = table.values["inertia"]
+    if isinstance(value, list) and any(isinstance(row, list) for row in value):
+        return _symmetric(table, table.matrix("inertia"))
+    return inertia.diagonal(table.numbers("inertia", 3, "the principal moments, or a 3x3 matrix"))
+
+
+def _symmetric(table: Table, matrix: Matrix) -> Matrix:
+    largest = max(abs(x) for row in matrix for x in row)
+    for i in range(3):
+        for j in range(i):
+            if abs(matrix[i][j] - matrix[j][i]) > 1e-12 * largest:
+                table.fail(
+                    f"must be symmetric, but row {j + 1}, column {i + 1} is {matrix[j][i]:g}"
+                    f" and row {i + 1}, column {j + 1} is {matrix[i][j]:g}",
+                    "inertia",
+                )
+    return tuple(tuple((matrix[i][j] + matrix[j][i]) / 2 for j in range(3)) for i in range(3))
+
+
+def _orientation(table: Table) -> Vector:
+    """The rotor, body to world."""
+    given = table.table("orientation", schema.ORIENTATION)
+    if table.group.dimension == 2:
+        return rotor_of_angle(given.number("angle") if given.values else 0.0)
+    if not given.values:
+        return (1.0, 0.0, 0.0, 0.0)
+    form = given.one_of("axis", "quaternion", "matrix") if not given.has("angle") else "axis"
+    for other in ("quaternion", "matrix"):
+        if form == "axis" and given.has(other):
+            given.fail(f'"angle" and "{other}" contradict each other; give axis and angle, or one')
+    if form == "axis":
+        axis = given.vector("axis")
+        if not any(axis):
+            given.fail("must not be zero", "axis")
+        return rotor_of_axis_angle(axis, given.number("angle"))
+    if form == "quaternion":
+        q = given.numbers("quaternion", 4, "[w, x, y, z]")
+        norm = math.hypot(*q)
+        if abs(norm - 1) > UNIT_TOLERANCE:
+            hint = (
+                f"; did you mean [{', '.join(f'{x / norm:.7g}' for x in q)}]?" if norm > 0 else ""
+            )
+            given.fail(f"must be a unit quaternion, but its norm is {norm:.9g}{hint}", "quaternion")
+        return rotor_of_quaternion(q)
+    matrix = np.array(given.matrix("matrix"))
+    with np.errstate(over="ignore"):
+        deviation = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
+    if not deviation <= UNIT_TOLERANCE:
+        given.fail(f"must be orthogonal, but R R^T differs from 1 by {deviation:.3g}", "matrix")
+    if np.linalg.det(matrix) < 0:
+        given.fail("must be a rotation, but its determinant is -1: it is a reflection", "matrix")
+    left, _, right = np.linalg.svd(matrix)
+    return rotor_of_quaternion(quaternion_of_matrix(left @ right))
+
+
+def _interactions(top: Table, bodies: tuple[Body, ...], most: int) -> tuple[Interaction, ...]:
+    tables = top.tables("interaction")
+    if len(tables) > most:
+        top.fail(
+            f"{len(tables)} interactions are more than the {most} allowed;"
+            f" allow more with [limits] interactions = {len(tables)}"
+        )
+    interactions: list[Interaction] = []
+    for number, values in enumerate(tables, 1):
+        place = f"interaction {number}"
+        kinds = tuple(schema.INTERACTIONS)
+        untyped = Table(top.file, place, values, schema.GRAVITY, top.group)
+        kind = untyped.choice("type", kinds, "types")
+        table = Table(top.file, place, values, schema.INTERACTIONS[kind], top.group)
+        table.refuse_unknown_keys()
+        if kind == "gravity":
+            interactions.append(Gravity(acceleration=table.vector("acceleration")))
+        else:
+            interactions.append(_spring(table, [body.name for body in bodies]))
+    return tuple(interactions)
+
+
+def _spring(table: Table, bodies: list[str]) -> Spring:
+    def body(key: str) -> str:
+        name = table.name(key)
+        if name not in bodies:
+            table.fail(
+                f"unknown body {quoted(name)}; bodies are {listed(bodies)}.{suggest(name, bodies)}"
+            )
+        return name
+
+    near = body("body")
+    anchor = other = other_at = None
+    if table.one_of("anchor", "other") == "anchor":
+        if table.has("other_at"):
+            table.fail('"anchor" and "other_at" contradict each other; "other_at" is for "other"')
+        anchor = table.vector("anchor")
+    else:
+        other, other_at = body("other"), table.vector("other_at")
+        if other == near:
+            table.fail(f'"{near}" cannot be tied to itself by a spring', "other")
+    return Spring(
+        body=near,
+        at=table.vector("at"),
+        anchor=anchor,
+        other=other,
+        other_at=other_at,
+        stiffness=table.number("stiffness"),
+        rest_length=table.number("rest_length"),
+    )
+
+
+def _refuse_singular_springs(top: Table, scene: Scene) -> None:
+    """A spring that pushes but has no length has no direction."""
+    for number, spring in enumerate(scene.interactions, 1):
+        if not isinstance(spring, Spring) or spring.rest_length == 0:
+            continue
+        near = scene.body(spring.body)
+        sizes = [*near.position, *spring.at, *(spring.anchor or ()), *(spring.other_at or ())]
+        size = max(spring.rest_length, *map(abs, sizes))
+        if float(np.linalg.norm(scene.spring_vector(spring))) <= 1e-12 * size:
+            top.fail(
+                f"interaction {number}: rest_length: the spring starts with length 0, where a"
+                f" spring of rest length {spring.rest_length:g} pushes in no direction;"
+                " move one of its ends"
+            )
+
+
+def _time(table: Table) -> Time:
+    end = table.number("end")
+    step = tolerance = None
+    if table.one_of("step", "tolerance") == "step":
+        step = table.number("step")
+        if step > end:
+            table.fail(f"{step:g} is longer than end = {end:g}", "step")
+        if Fraction(end) > schema.MOST_STEPS * Fraction(step):
+            table.fail(
+                f"end / step is {end / step:.3g}; at most {schema.MOST_STEPS:.0e} steps are"
+                " allowed",
+                "step",
+            )
+    else:
+        tolerance = table.number("tolerance")
+    return Time(
+        end=end,
+        step=step,
+        tolerance=tolerance,
+        method=table.choice("method", schema.METHODS, "methods"),
+    )
