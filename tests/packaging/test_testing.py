@@ -15,7 +15,7 @@ from hamotor.testing import Check, Outcome
 ROOT = Path(__file__).resolve().parents[2]
 PASSES = Check("passes", ((sys.executable, "-c", "print('it ran')"),))
 FAILS = Check("fails", ((sys.executable, "-c", "raise SystemExit(7)"), ("never", "reached")))
-READS = Check("reads", ((sys.executable, "-c", "import sys; sys.exit(sys.stdin.read())"),))
+READS = Check("reads", ((sys.executable, "-c", "import sys; sys.exit(len(sys.stdin.read()))"),))
 
 
 def test_a_failure_does_not_stop_the_checks_after_it(
