@@ -1,0 +1,127 @@
+"""C++ text of expressions, programs and element types.  Nothing here knows an algebra."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from hamotor.codegen.element import Element
+from hamotor.codegen.program import (
+    Call,
+    Expression,
+    MultiplyAdd,
+    Name,
+    Negative,
+    Number,
+    Product,
+    Program,
+    Quotient,
+    Select,
+    Sum,
+    walk,
+)
+
+PAIRS = {
+    "compensated_dot_pair",
+    "double_word_sqrt",
+    "double_word_unscale",
+    "double_word_ratio",
+    "sin_cos",
+}
+"""Functions of the runtime that return two numbers."""
+
+_SUM, _PRODUCT, _UNARY, _ATOM = range(4)
+
+
+def number_text(value: Fraction) -> str:
+    """An exact constant of scalar type S."""
+    if value.denominator == 1:
+        return f"S({value.numerator})"
+    if value.denominator & (value.denominator - 1) == 0 and value.denominator <= 1024:
+        return f"S({float(value)!r})"
+    return f"(S({value.numerator}) / S({value.denominator}))"
+
+
+def expression_text(expression: Expression) -> str:
+    """C++ text of one expression."""
+    return _text(expression)[0]
+
+
+def _wrapped(expression: Expression, at_least: int) -> str:
+    text, level = _text(expression)
+    return text if level >= at_least else f"({text})"
+
+
+def _text(expression: Expression) -> tuple[str, int]:
+    match expression:
+        case Name(text):
+            return text, _ATOM
+        case Number(value):
+            return number_text(value), _ATOM
+        case Negative(x):
+            return f"-{_wrapped(x, _ATOM)}", _UNARY
+        case Sum(a, Negative(b)):
+            return f"{_wrapped(a, _SUM)} - {_wrapped(b, _PRODUCT)}", _SUM
+        case Sum(a, b):
+            return f"{_wrapped(a, _SUM)} + {_wrapped(b, _PRODUCT)}", _SUM
+        case Product(a, b):
+            return f"{_wrapped(a, _PRODUCT)} * {_wrapped(b, _UNARY)}", _PRODUCT
+        case Quotient(a, b):
+            return f"{_wrapped(a, _PRODUCT)} / {_wrapped(b, _ATOM)}", _PRODUCT
+        case MultiplyAdd(a, b, c):
+            arguments = ", ".join(expression_text(x) for x in (a, b, c))
+            return f"mul_add({arguments})", _ATOM
+        case Call(function, arguments):
+            listed = ", ".join(expression_text(x) for x in arguments)
+            template = "" if arguments else "<S>"
+            return f"scalar::{function}{template}({listed})", _ATOM
+        case Select(x, positive, otherwise):
+            listed = ", ".join(
+                [
+                    f"{_wrapped(x, _PRODUCT)} > S(0)",
+                    *(expression_text(e) for e in (positive, otherwise)),
+                ]
+            )
+            return f"select({listed})", _ATOM
+
+
+def scalar_type(element: Element | None) -> str:
+    """C++ type of a value with scalar S."""
+    if element is None or element.name == "Scalar":
+        return "S"
+    return f"{element.cpp_name}<S>"
+
+
+def used_names(program: Program) -> set[str]:
+    """Everything that the program reads, and the parameters it belongs to."""
+    names: set[str] = set()
+    for _, expression in (*program.bindings, *program.outputs):
+        for node in walk(expression):
+            if isinstance(node, Name):
+                names.add(node.text)
+                names.add(node.text.split(".")[0])
+    return names
+
+
+def signature_text(name: str, program: Program) -> str:
+    """`Motor<S> gp(const Motor<S>& a, const Motor<S>& b)`."""
+    used = used_names(program)
+    arguments = []
+    for parameter in program.parameters:
+        shown = parameter.name if parameter.name in used else f"/*{parameter.name}*/"
+        arguments.append(f"const {scalar_type(parameter.element)}& {shown}")
+    return f"{scalar_type(program.result)} {name}({', '.join(arguments)})"
+
+
+def body_lines(program: Program) -> list[str]:
+    """Statements of the function body, unformatted."""
+    lines = []
+    for name, expression in program.bindings:
+        kind = "auto" if isinstance(expression, Call) and expression.function in PAIRS else "S"
+        lines.append(f"const {kind} {name} = {expression_text(expression)};")
+    if program.result is None or program.result.name == "Scalar":
+        ((_, expression),) = program.outputs
+        lines.append(f"return {expression_text(expression)};")
+        return lines
+    fields = ", ".join(f".{name} = {expression_text(e)}" for name, e in program.outputs)
+    lines.append(f"return {{{fields}}};")
+    return lines

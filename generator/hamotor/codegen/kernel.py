@@ -1,0 +1,226 @@
+"""Kernels that are polynomial in their arguments: what they mean, exactly, and how to compute it.
+
+A `Kernel` carries its meaning (one exact polynomial per component of the result, derived from the
+algebra alone) and a `Program`.  `proved` expands the program and compares: a kernel whose program
+does not mean what the algebra says cannot leave this module.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from hamotor.codegen import polynomial as poly
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, reverse_sign
+from hamotor.codegen.element import Element
+from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
+from hamotor.codegen.program import (
+    Expression,
+    MultiplyAdd,
+    Parameter,
+    Product,
+    Program,
+    number,
+    polynomial_expression,
+)
+
+ONE: Polynomial = {(): Fraction(1)}
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """One function of the generated library.
+
+    name:    C++ function name; law: what it computes, in formulas, for its documentation.
+    meaning: component → polynomial in `parameter.component`; None for transcendental kernels.
+    pairs:   (kept, possible) products of components, the sparsity of a bilinear kernel.
+    """
+
+    name: str
+    law: str
+    program: Program
+    meaning: Mapping[str, Polynomial] | None
+    namespace: str = ""
+    pairs: tuple[int, int] | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def operands(self) -> tuple[Element, ...]:
+        """Element types of the arguments."""
+        return tuple(p.element for p in self.program.parameters)
+
+
+def parameters_for(*elements: Element) -> tuple[Parameter, ...]:
+    """Parameters named by their types' symbols; equal symbols become a, b."""
+    symbols = [element.symbol for element in elements]
+    if len(set(symbols)) < len(symbols):
+        symbols = ["a", "b", "c", "d"][: len(symbols)]
+    return tuple(Parameter(s, e) for s, e in zip(symbols, elements, strict=True))
+
+
+def value_of(parameter: Parameter) -> PolynomialMultivector:
+    """The multivector that a parameter stands for."""
+    element = parameter.element
+    result: PolynomialMultivector = {b: {(): x} for b, x in element.fixed.items()}
+    for component in element.components:
+        for blade, x in component.embedding.items():
+            poly.add_term(result.setdefault(blade, {}), (f"{parameter.name}.{component.name}",), x)
+    return result
+
+
+def read_off(value: Mapping[Blade, Polynomial], element: Element) -> dict[str, Polynomial]:
+    """The components of a multivector in an element type."""
+    result: dict[str, Polynomial] = {}
+    for component, functional in zip(element.components, element.reading, strict=True):
+        total: Polynomial = {}
+        for blade, x in functional.items():
+            if blade in value:
+                poly.add_scaled(total, value[blade], x)
+        result[component.name] = total
+    return result
+
+
+def reversed_value(value: Mapping[Blade, Polynomial]) -> PolynomialMultivector:
+    """Reversal ~ of a multivector."""
+    return {b: poly.scaled(p, Fraction(reverse_sign(b))) for b, p in value.items()}
+
+
+def direct_program(
+    parameters: tuple[Parameter, ...], meaning: Mapping[str, Polynomial], result: Element
+) -> Program:
+    """The program that evaluates each polynomial as it stands."""
+    outputs = tuple((name, polynomial_expression(p)) for name, p in meaning.items())
+    return Program(parameters, (), outputs, result)
+
+
+def proved(kernel: Kernel) -> Kernel:
+    """The kernel itself, after its program has been expanded and found equal to its meaning."""
+    if kernel.meaning is not None and kernel.program.expand() != kernel.meaning:
+        raise AssertionError(f"{kernel.name}: the program does not expand to its definition")
+    return kernel
+
+
+def product_kernel(
+    algebra: Algebra,
+    name: str,
+    law: str,
+    product: Callable[[Blade, Blade], Multivector],
+    left: Element,
+    right: Element,
+    result: Element,
+    namespace: str = "",
+    factor: Fraction = Fraction(1),
+) -> Kernel:
+    """A bilinear product, read off in `result`; `factor` multiplies it."""
+    a, b = parameters_for(left, right)
+    value = poly.apply_bilinear(product, value_of(a), value_of(b))
+    meaning = {n: poly.scaled(p, factor) for n, p in read_off(value, result).items()}
+    kept = {m for p in meaning.values() for m in p}
+    pairs = (len(kept), (len(a.element.blades)) * (len(b.element.blades)))
+    program = direct_program((a, b), meaning, result)
+    return proved(Kernel(name, law, program, meaning, namespace, pairs))
+
+
+def linear_kernel(
+    name: str,
+    law: str,
+    transform: Callable[[PolynomialMultivector], PolynomialMultivector],
+    operand: Element,
+    result: Element,
+    namespace: str = "",
+) -> Kernel:
+    """A linear map of one argument, such as reversal or a grade projection."""
+    (a,) = parameters_for(operand)
+    meaning = read_off(transform(value_of(a)), result)
+    return proved(Kernel(name, law, direct_program((a,), meaning, result), meaning, namespace))
+
+
+def quadratic_kernel(
+    algebra: Algebra, name: str, law: str, operand: Element, result: Element
+) -> Kernel:
+    """The norm <A ~A> read off in `result`."""
+    (a,) = parameters_for(operand)
+    value = value_of(a)
+    square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
+    meaning = read_off(square, result)
+    return proved(Kernel(name, law, direct_program((a,), meaning, result), meaning))
+
+
+class Staging:
+    """Bindings of a program under construction: each holds the primitive part of a polynomial."""
+
+    def __init__(self) -> None:
+        """Start without bindings."""
+        self.bindings: list[tuple[str, Expression]] = []
+        self.meaning: dict[str, Polynomial] = {}
+
+    def bind(self, name: str, polynomial: Polynomial) -> Polynomial:
+        """Give a polynomial a name; returns the (scaled) name, to be used in its place."""
+        if not polynomial:
+            return {}
+        if len(polynomial) == 1 and len(next(iter(polynomial))) <= 1:
+            return polynomial
+        content = poly.content(polynomial)
+        primitive = poly.scaled(polynomial, 1 / content)
+        self.bindings.append((name, polynomial_expression(primitive)))
+        self.meaning[name] = primitive
+        return {(name,): content}
+
+
+def sandwich_kernel(
+    algebra: Algebra,
+    name: str,
+    law: str,
+    versor: Element,
+    operand: Element,
+    result: Element,
+    namespace: str = "",
+) -> Kernel:
+    """M X ~M for an even unit versor M, as X + 2 (M × X) ~M.
+
+    The identity M X ~M = X + [M, X] ~M holds where M ~M = 1.  The commutator M × X is sparse (what
+    commutes with X drops out), so this costs far fewer operations than two products, and its error
+    is proportional to the displacement, not to X.  The unit condition enters the program exactly
+    as the difference X (1 − M ~M), which the proof adds to the definition.
+    """
+    m, x = parameters_for(versor, operand)
+    motor, value = value_of(m), value_of(x)
+    staging = Staging()
+    commutator = poly.apply_bilinear(algebra.commutator, motor, value)
+    moved: PolynomialMultivector = {}
+    for blade in sorted(commutator):
+        named = staging.bind(f"c_{algebra.blade_name(blade)}", commutator[blade])
+        if named:
+            moved[blade] = named
+    turned = poly.apply_bilinear(algebra.geometric, moved, reversed_value(motor))
+    change = read_off(turned, result)
+    still = read_off(value, result)
+    outputs: list[tuple[str, Expression]] = []
+    for component in result.components:
+        rest = change[component.name]
+        kept = polynomial_expression(still[component.name])
+        if not rest:
+            outputs.append((component.name, kept))
+            continue
+        content = 2 * poly.content(rest)
+        inner = polynomial_expression(poly.scaled(rest, 2 / content))
+        factor = number(content)
+        if still[component.name]:
+            outputs.append((component.name, MultiplyAdd(factor, inner, kept)))
+        else:
+            outputs.append((component.name, Product(factor, inner)))
+    program = Program((m, x), tuple(staging.bindings), tuple(outputs), result)
+
+    both = poly.apply_bilinear(
+        algebra.geometric,
+        poly.apply_bilinear(algebra.geometric, motor, value),
+        reversed_value(motor),
+    )
+    norm = poly.apply_bilinear(algebra.geometric, motor, reversed_value(motor))
+    defect = poly.added({0: ONE}, norm, Fraction(-1))
+    meaning = read_off(
+        poly.added(both, poly.apply_bilinear(algebra.geometric, value, defect)), result
+    )
+    notes = ("Needs M ~M = 1: computed as X + 2 (M × X) ~M.",)
+    return proved(Kernel(name, law, program, meaning, namespace, None, notes))

@@ -1,0 +1,234 @@
+"""From a checked spec to its kernels: every request answered, every group's functions added."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+
+from hamotor.codegen import transcendental
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, grade
+from hamotor.codegen.element import Element
+from hamotor.codegen.group import LieGroup
+from hamotor.codegen.kernel import (
+    Kernel,
+    direct_program,
+    linear_kernel,
+    parameters_for,
+    product_kernel,
+    proved,
+    quadratic_kernel,
+    reversed_value,
+    sandwich_kernel,
+    value_of,
+)
+from hamotor.codegen.polynomial import PolynomialMultivector, apply_bilinear, scaled
+from hamotor.codegen.spec import AlgebraSpec, Request
+from hamotor.errors import UsageError
+
+LAWS = {
+    "gp": "a b, the geometric product",
+    "outer": "a ∧ b",
+    "inner": "the part of grade |i − j| of a b",
+    "left_contraction": "a ⌋ b",
+    "right_contraction": "a ⌊ b",
+    "regressive": "a ∨ b, the join in PGA: (a ∨ b)* = a* ∧ b*",
+    "commutator": "a × b = ½(a b − b a)",
+    "anticommutator": "½(a b + b a)",
+}
+
+
+def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multivector]:
+    """The product of basis blades that an operation of two operands extends."""
+    products: dict[str, Callable[[Blade, Blade], Multivector]] = {
+        "gp": algebra.geometric,
+        "outer": algebra.outer,
+        "inner": algebra.inner,
+        "left_contraction": algebra.left_contraction,
+        "right_contraction": algebra.right_contraction,
+        "regressive": algebra.regressive,
+        "commutator": algebra.commutator,
+        "anticommutator": algebra.anticommutator,
+    }
+    return products[operation]
+
+
+def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
+    """Every kernel of a spec, in the order of its requests and then of its groups."""
+    kernels = [request_kernel(spec, request) for request in spec.requests]
+    for group in spec.groups:
+        kernels += group_kernels(spec, group)
+    return tuple(kernels)
+
+
+def smallest_element(spec: AlgebraSpec, value: Mapping[Blade, object], where: str) -> Element:
+    """The declared element type with the fewest components that holds these blades.
+
+    Types that promise more than their blades (unit versors, normalised points) are not candidates.
+    """
+    blades = set(value)
+    candidates = [
+        e for e in spec.elements.values() if blades <= set(e.blades) and not e.unit and not e.fixed
+    ]
+    if not candidates:
+        names = ", ".join(spec.algebra.blade_name(b) for b in sorted(blades)) or "nothing"
+        raise UsageError(
+            f"{where}: no element type holds the result ({names}); declare one, or name the type "
+            'to project onto with "-> RESULT"'
+        )
+    return min(candidates, key=lambda e: len(e.components))
+
+
+def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
+    """The kernel that a request asks for."""
+    where = f"{spec.file}: {request}"
+    algebra = spec.algebra
+    operands = [spec.element(name, where) for name in request.operands]
+    result = spec.element(request.result, where) if request.result else None
+    if request.operation in LAWS:
+        left, right = operands
+        product = bilinear(algebra, request.operation)
+        if result is None:
+            a, b = parameters_for(left, right)
+            result = smallest_element(
+                spec, apply_bilinear(product, value_of(a), value_of(b)), where
+            )
+        name = request.operation
+        return product_kernel(algebra, name, LAWS[name], product, left, right, result)
+    if request.operation == "sandwich":
+        versor, operand = operands
+        if not versor.unit or any(g % 2 for g in versor.grades):
+            raise UsageError(f"{where}: {versor.name} must be a unit even versor (unit = true)")
+        law = "m x ~m: moves x by m"
+        return sandwich_kernel(algebra, "sandwich", law, versor, operand, result or operand)
+    return _unary_kernel(spec, request, operands[0], result, where)
+
+
+def _unary_kernel(
+    spec: AlgebraSpec, request: Request, operand: Element, result: Element | None, where: str
+) -> Kernel:
+    algebra = spec.algebra
+    (a,) = parameters_for(operand)
+    match request.operation:
+        case "reverse":
+            return linear_kernel(
+                "reverse",
+                "~a: every product in reversed order",
+                reversed_value,
+                operand,
+                result or operand,
+            )
+        case "grade":
+            wanted = request.grade if request.grade is not None else 0
+
+            def project(value: PolynomialMultivector) -> PolynomialMultivector:
+                return {b: p for b, p in value.items() if grade(b) == wanted}
+
+            target = result or smallest_element(spec, project(value_of(a)), where)
+            law = f"<a>_{wanted}: the part of grade {wanted}"
+            return linear_kernel(f"grade_{wanted}", law, project, operand, target)
+        case "complement":
+
+            def dual(value: PolynomialMultivector) -> PolynomialMultivector:
+                return {
+                    c: scaled(p, x)
+                    for b, p in value.items()
+                    for c, x in algebra.complement(b).items()
+                }
+
+            target = result or smallest_element(spec, dual(value_of(a)), where)
+            law = "a*, the right complement: b ∧ b* = I for every basis blade b"
+            return linear_kernel("complement", law, dual, operand, target)
+        case "norm_squared":
+            target = result or spec.element("Scalar", where)
+            return quadratic_kernel(algebra, "norm_squared", "<a ~a>₀", operand, target)
+        case "normalize":
+            return transcendental.normalize_kernel(algebra, operand, result or operand)
+        case operation:
+            if result is None:
+                raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
+            build = {
+                "exp": transcendental.exp_kernel,
+                "log": transcendental.log_kernel,
+                "cayley": transcendental.cayley_kernel,
+                "cayley_inverse": transcendental.cayley_inverse_kernel,
+            }[operation]
+            return build(algebra, operand, result, "", where)
+
+
+def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
+    """The functions of a Lie group on its elements, rates and momenta (theory.md §2)."""
+    algebra, element, rate, momentum = spec.algebra, group.element, group.rate, group.momentum
+    namespace = rate.namespace
+    where = f"{spec.file}: group {group.name}"
+
+    def bracket(a: Blade, b: Blade) -> Multivector:
+        return {c: 2 * x for c, x in algebra.commutator(a, b).items()}
+
+    def reversed_bracket(a: Blade, b: Blade) -> Multivector:
+        return bracket(b, a)
+
+    def product(
+        name: str,
+        law: str,
+        table: Callable[[Blade, Blade], Multivector],
+        left: Element,
+        right: Element,
+        result: Element,
+        factor: Fraction = Fraction(1),
+    ) -> Kernel:
+        return product_kernel(algebra, name, law, table, left, right, result, namespace, factor)
+
+    kernels = [
+        product("ad", "ad_a b = [a, b] = a b − b a", bracket, rate, rate, rate),
+        product(
+            "coadjoint",
+            "ad*_w μ = [μ, w], so that (ad*_w μ)(b) = μ([w, b])",
+            reversed_bracket,
+            rate,
+            momentum,
+            momentum,
+        ),
+        product(
+            "kinematics",
+            "m w: the velocity of m with body rate w (not a unit versor)",
+            algebra.geometric,
+            element,
+            rate,
+            element,
+        ),
+        sandwich_kernel(
+            algebra, "Ad", "m w ~m: a body rate as a spatial rate", element, rate, rate, namespace
+        ),
+        sandwich_kernel(
+            algebra,
+            "Ad_star_inverse",
+            "m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ)",
+            element,
+            momentum,
+            momentum,
+            namespace,
+        ),
+        _pairing(group),
+    ]
+    kernels += [
+        transcendental.exp_kernel(algebra, rate, element, namespace, where),
+        transcendental.log_kernel(algebra, element, rate, namespace, where),
+        transcendental.cayley_kernel(algebra, rate, element, namespace, where),
+        transcendental.cayley_inverse_kernel(algebra, element, rate, namespace, where),
+    ]
+    return kernels
+
+
+def _pairing(group: LieGroup) -> Kernel:
+    """<μ, w> = Σ μ_a w_a, since rate and momentum coordinates are dual."""
+    parameters = parameters_for(group.momentum, group.rate)
+    mu, w = parameters
+    meaning = {
+        "s": {
+            tuple(sorted((f"{mu.name}.{g.momentum}", f"{w.name}.{g.rate}"))): Fraction(1)
+            for g in group.generators
+        }
+    }
+    program = direct_program(parameters, meaning, None)
+    law = "μ(w) = (μ ∧ w) / I: twice the kinetic energy if w is the rate of μ"
+    return proved(Kernel("pairing", law, program, meaning, group.rate.namespace))

@@ -1,0 +1,95 @@
+"""Exact polynomials in named components, and multivectors with such coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from math import gcd, lcm
+
+from hamotor.codegen.algebra import Blade, Multivector
+
+Monomial = tuple[str, ...]
+Polynomial = dict[Monomial, Fraction]
+"""Sorted factor names → exact coefficient; no zero coefficients are stored."""
+
+PolynomialMultivector = dict[Blade, Polynomial]
+
+
+def add_term(into: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
+    """Add one term, dropping it if it cancels."""
+    total = into.get(monomial, Fraction(0)) + coefficient
+    if total:
+        into[monomial] = total
+    else:
+        into.pop(monomial, None)
+
+
+def add_scaled(into: Polynomial, other: Mapping[Monomial, Fraction], factor: Fraction) -> None:
+    """Add `factor * other` to `into`."""
+    for monomial, coefficient in other.items():
+        add_term(into, monomial, factor * coefficient)
+
+
+def times(a: Mapping[Monomial, Fraction], b: Mapping[Monomial, Fraction]) -> Polynomial:
+    """Product of two polynomials."""
+    result: Polynomial = {}
+    for left, x in a.items():
+        for right, y in b.items():
+            add_term(result, tuple(sorted((*left, *right))), x * y)
+    return result
+
+
+def content(polynomial: Mapping[Monomial, Fraction]) -> Fraction:
+    """Greatest common divisor of the coefficients, with the sign of the first term."""
+    coefficients = list(polynomial.values())
+    numerator = gcd(*(c.numerator for c in coefficients))
+    denominator = lcm(*(c.denominator for c in coefficients))
+    sign = -1 if all(c < 0 for c in coefficients) else 1
+    return Fraction(sign * numerator, denominator)
+
+
+def scaled(a: Mapping[Monomial, Fraction], factor: Fraction) -> Polynomial:
+    """`factor * a`."""
+    return {m: factor * c for m, c in a.items()} if factor else {}
+
+
+def apply_bilinear(
+    product: Callable[[Blade, Blade], Multivector],
+    a: Mapping[Blade, Polynomial],
+    b: Mapping[Blade, Polynomial],
+) -> PolynomialMultivector:
+    """Extend a product of basis blades to multivectors with polynomial coefficients."""
+    result: PolynomialMultivector = {}
+    for blade_a, x in a.items():
+        for blade_b, y in b.items():
+            table = product(blade_a, blade_b)
+            if not table:
+                continue
+            xy = times(x, y)
+            for blade, coefficient in table.items():
+                into = result.setdefault(blade, {})
+                add_scaled(into, xy, coefficient)
+    return {blade: p for blade, p in result.items() if p}
+
+
+def added(
+    a: Mapping[Blade, Polynomial], b: Mapping[Blade, Polynomial], factor: Fraction = Fraction(1)
+) -> PolynomialMultivector:
+    """`a + factor * b`."""
+    result: PolynomialMultivector = {blade: dict(p) for blade, p in a.items()}
+    for blade, p in b.items():
+        add_scaled(result.setdefault(blade, {}), p, factor)
+    return {blade: p for blade, p in result.items() if p}
+
+
+def substituted(
+    polynomial: Mapping[Monomial, Fraction], values: Mapping[str, Polynomial]
+) -> Polynomial:
+    """Replace every name found in `values` by its polynomial."""
+    result: Polynomial = {}
+    for monomial, coefficient in polynomial.items():
+        term: Polynomial = {(): coefficient}
+        for name in monomial:
+            term = times(term, values[name] if name in values else {(name,): Fraction(1)})
+        add_scaled(result, term, Fraction(1))
+    return result

@@ -1,0 +1,339 @@
+"""Straight-line programs: what a kernel computes, operation by operation.
+
+Everything that is known about cost and meaning is read off this value: operation counts, the C++
+text, the polynomial it stands for (`expand`) and numbers in any arithmetic (`evaluate`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+from hamotor.codegen.element import Element
+from hamotor.codegen.polynomial import Polynomial, add_scaled, scaled, times
+
+
+@dataclass(frozen=True)
+class Name:
+    """A component of a parameter (`m.e12`) or an earlier binding."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Number:
+    """An exact rational constant."""
+
+    value: Fraction
+
+
+@dataclass(frozen=True)
+class Negative:
+    """−x; free, since every multiply-add exists in a negated form."""
+
+    x: Expression
+
+
+@dataclass(frozen=True)
+class Sum:
+    """a + b."""
+
+    a: Expression
+    b: Expression
+
+
+@dataclass(frozen=True)
+class Product:
+    """a b."""
+
+    a: Expression
+    b: Expression
+
+
+@dataclass(frozen=True)
+class MultiplyAdd:
+    """a b + c, in one rounding where the hardware has it."""
+
+    a: Expression
+    b: Expression
+    c: Expression
+
+
+@dataclass(frozen=True)
+class Quotient:
+    """a / b."""
+
+    a: Expression
+    b: Expression
+
+
+@dataclass(frozen=True)
+class Call:
+    """A function of scalars: sqrt, sin, cos, atan2, … or one of the runtime's own."""
+
+    function: str
+    arguments: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class Select:
+    """`positive if x > 0 else otherwise`, lane by lane."""
+
+    x: Expression
+    positive: Expression
+    otherwise: Expression
+
+
+Expression = Name | Number | Negative | Sum | Product | MultiplyAdd | Quotient | Call | Select
+
+
+def children(expression: Expression) -> tuple[Expression, ...]:
+    """The operands of an expression."""
+    match expression:
+        case Name() | Number():
+            return ()
+        case Negative(x):
+            return (x,)
+        case Sum(a, b) | Product(a, b) | Quotient(a, b):
+            return (a, b)
+        case MultiplyAdd(a, b, c):
+            return (a, b, c)
+        case Call(_, arguments):
+            return arguments
+        case Select(x, positive, otherwise):
+            return (x, positive, otherwise)
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Operations by kind.  A multiply-add counts as one multiplication and one addition."""
+
+    mul: int = 0
+    add: int = 0
+    fused: int = 0
+    div: int = 0
+    calls: Mapping[str, int] = field(default_factory=dict)
+
+    def __add__(self, other: Cost) -> Cost:
+        """Total of two costs."""
+        names = sorted({*self.calls, *other.calls})
+        return Cost(
+            self.mul + other.mul,
+            self.add + other.add,
+            self.fused + other.fused,
+            self.div + other.div,
+            {n: self.calls.get(n, 0) + other.calls.get(n, 0) for n in names},
+        )
+
+    def __str__(self) -> str:
+        """For a header: `48 mul, 40 add (40 fused)`."""
+        parts = [f"{self.mul} mul", f"{self.add} add"]
+        if self.fused:
+            parts[-1] += f" ({self.fused} fused)"
+        if self.div:
+            parts.append(f"{self.div} div")
+        parts += [f"{count} {name}" for name, count in sorted(self.calls.items())]
+        return ", ".join(parts)
+
+    def as_data(self) -> dict[str, int]:
+        """For the index of kernels."""
+        return {"mul": self.mul, "add": self.add, "fused": self.fused, "div": self.div} | dict(
+            sorted(self.calls.items())
+        )
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A named argument of a kernel."""
+
+    name: str
+    element: Element
+
+
+@dataclass(frozen=True)
+class Program:
+    """Bindings in order, then one expression per component of the result.
+
+    result None: the program returns one scalar, under the output name `value`.
+    """
+
+    parameters: tuple[Parameter, ...]
+    bindings: tuple[tuple[str, Expression], ...]
+    outputs: tuple[tuple[str, Expression], ...]
+    result: Element | None
+
+    @property
+    def cost(self) -> Cost:
+        """Operation count by kind."""
+        total = Cost()
+        for _, expression in (*self.bindings, *self.outputs):
+            for node in walk(expression):
+                total = total + _node_cost(node)
+        return total
+
+    def expand(self) -> dict[str, Polynomial]:
+        """The polynomials in the parameters that the outputs stand for.
+
+        Raises ValueError if the program is not polynomial.
+        """
+        known: dict[str, Polynomial] = {}
+        for name, expression in self.bindings:
+            known[name] = _expand(expression, known)
+        return {name: _expand(expression, known) for name, expression in self.outputs}
+
+    def evaluate(
+        self, values: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
+    ) -> dict[str, Any]:
+        """Run the program on numbers of any type.
+
+        values:    `parameter.component` → number.
+        functions: the scalar functions by name, and `number` (from a Fraction).
+        """
+        known = dict(values)
+        for name, expression in self.bindings:
+            known[name] = _evaluate(expression, known, functions)
+        return {name: _evaluate(e, known, functions) for name, e in self.outputs}
+
+
+def walk(expression: Expression) -> Iterator[Expression]:
+    """The expression and everything below it."""
+    yield expression
+    for child in children(expression):
+        yield from walk(child)
+
+
+def _node_cost(node: Expression) -> Cost:
+    match node:
+        case Sum():
+            return Cost(add=1)
+        case Product():
+            return Cost(mul=1)
+        case MultiplyAdd():
+            return Cost(mul=1, add=1, fused=1)
+        case Quotient():
+            return Cost(div=1)
+        case Call(function, _):
+            return Cost(calls={function: 1})
+        case Select():
+            return Cost(calls={"select": 1})
+        case _:
+            return Cost()
+
+
+def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomial:
+    match expression:
+        case Name(text):
+            return dict(known[text]) if text in known else {(text,): Fraction(1)}
+        case Number(value):
+            return {(): value} if value else {}
+        case Negative(x):
+            return scaled(_expand(x, known), Fraction(-1))
+        case Sum(a, b):
+            total = _expand(a, known)
+            add_scaled(total, _expand(b, known), Fraction(1))
+            return total
+        case Product(a, b):
+            return times(_expand(a, known), _expand(b, known))
+        case MultiplyAdd(a, b, c):
+            total = _expand(c, known)
+            add_scaled(total, times(_expand(a, known), _expand(b, known)), Fraction(1))
+            return total
+        case _:
+            raise ValueError(f"not a polynomial: {expression}")
+
+
+def _evaluate(
+    expression: Expression, known: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
+) -> Any:
+    if isinstance(expression, Name):
+        return known[expression.text]
+    if isinstance(expression, Number):
+        return functions["number"](expression.value)
+    operands = [_evaluate(child, known, functions) for child in children(expression)]
+    match expression:
+        case Negative():
+            return -operands[0]
+        case Sum():
+            return operands[0] + operands[1]
+        case Product():
+            return operands[0] * operands[1]
+        case MultiplyAdd():
+            return operands[0] * operands[1] + operands[2]
+        case Quotient():
+            return operands[0] / operands[1]
+        case Select():
+            return operands[1] if operands[0] > 0 else operands[2]
+        case Call(function, _):
+            return functions[function](*operands)
+
+
+# ---------------------------------------------------------------- building expressions
+
+
+def number(value: int | Fraction) -> Number:
+    """An exact constant."""
+    return Number(Fraction(value))
+
+
+def negative(x: Expression) -> Expression:
+    """−x, folding double signs and constants."""
+    match x:
+        case Negative(inner):
+            return inner
+        case Number(value):
+            return Number(-value)
+        case Product(a, Negative(b)):
+            return Product(a, b)
+        case Product(Negative(a), b):
+            return Product(a, b)
+        case _:
+            return Negative(x)
+
+
+def sum_of_products(terms: list[tuple[Expression, ...]]) -> Expression:
+    """Σ of products of one or two factors, as one chain of multiply-adds in the given order.
+
+    Terms of one factor go first, so that every product can be fused onto them.
+    """
+    single = [t[0] for t in terms if len(t) == 1]
+    double = [t for t in terms if len(t) == 2]
+    if single:
+        total = single[0]
+        for x in single[1:]:
+            total = Sum(total, x)
+    elif double:
+        a, b = double.pop(0)
+        total = Product(a, b)
+    else:
+        return number(0)
+    for a, b in double:
+        total = MultiplyAdd(a, b, total)
+    return total
+
+
+def polynomial_expression(polynomial: Polynomial) -> Expression:
+    """An expression for a polynomial of degree at most two in each term.
+
+    Terms keep their order; coefficients of equal size are taken out of the sum.
+    """
+    if not polynomial:
+        return number(0)
+    groups: dict[Fraction, list[tuple[Expression, ...]]] = {}
+    for monomial, coefficient in polynomial.items():
+        factors: list[Expression] = [Name(text) for text in monomial]
+        size = abs(coefficient)
+        if not factors:
+            groups.setdefault(Fraction(1), []).append((Number(coefficient),))
+            continue
+        if coefficient < 0:
+            factors[0] = negative(factors[0])
+        if len(factors) > 2:
+            raise ValueError(f"a term has more than two factors: {monomial}")
+        groups.setdefault(size, []).append(tuple(factors))
+    unscaled = groups.pop(Fraction(1), [])
+    terms = [*((Number(size), sum_of_products(group)) for size, group in groups.items())]
+    if not unscaled and len(terms) == 1:
+        return Product(*terms[0])
+    return sum_of_products([*unscaled, *terms])

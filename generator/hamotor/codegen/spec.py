@@ -1,0 +1,383 @@
+"""Algebra specs: what the TOML says, typed and checked.  Every input error is raised here."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from hamotor.codegen.algebra import Algebra, Blade
+from hamotor.codegen.element import Component, Element, blade_component
+from hamotor.codegen.group import Generator, LieGroup, lie_group
+from hamotor.errors import UsageError, suggest
+
+BUNDLED = Path(__file__).resolve().parents[2] / "algebras"
+MAXIMUM_DIMENSION = 8
+MAXIMUM_BYTES = 1 << 20
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
+KEYS = ("name", "description", "basis", "gram", "element", "kernels", "group")
+OPERATIONS = {
+    "gp": 2,
+    "outer": 2,
+    "inner": 2,
+    "left_contraction": 2,
+    "right_contraction": 2,
+    "regressive": 2,
+    "commutator": 2,
+    "anticommutator": 2,
+    "sandwich": 2,
+    "reverse": 1,
+    "grade": 1,
+    "complement": 1,
+    "norm_squared": 1,
+    "exp": 1,
+    "log": 1,
+    "cayley": 1,
+    "cayley_inverse": 1,
+    "normalize": 1,
+}
+"""Operation → number of operands."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """One kernel that a spec asks for.  result None: the smallest element that holds it."""
+
+    operation: str
+    operands: tuple[str, ...]
+    result: str | None
+    grade: int | None = None
+
+    def __str__(self) -> str:
+        """As the spec writes it."""
+        arrow = f" -> {self.result}" if self.result else ""
+        grade = f" {self.grade}" if self.grade is not None else ""
+        return f"{self.operation} {' '.join(self.operands)}{grade}{arrow}"
+
+
+@dataclass(frozen=True)
+class AlgebraSpec:
+    """A checked spec: the algebra, its element types, its groups and the kernels it asks for."""
+
+    file: str
+    description: str
+    digest: str
+    algebra: Algebra
+    elements: Mapping[str, Element]
+    groups: tuple[LieGroup, ...]
+    requests: tuple[Request, ...]
+
+    @property
+    def name(self) -> str:
+        """The algebra's name."""
+        return self.algebra.name
+
+    def element(self, name: str, where: str) -> Element:
+        """Element type by name; raises UsageError with what there is."""
+        found = self.elements.get(name)
+        if found is None:
+            known = ", ".join(self.elements)
+            raise UsageError(
+                f'{where}: unknown element "{name}"; {self.name} has {known}.'
+                + suggest(name, self.elements)
+            )
+        return found
+
+
+def bundled_algebras() -> list[str]:
+    """Names of the specs that come with Hamotor."""
+    return sorted(path.stem for path in BUNDLED.glob("*.toml"))
+
+
+def bundled_path(name: str) -> Path:
+    """Path of a bundled spec; raises UsageError where there is none of that name."""
+    known = bundled_algebras()
+    if name not in known:
+        raise UsageError(
+            f'unknown algebra "{name}"; bundled are {", ".join(known)}.{suggest(name, known)}'
+        )
+    return BUNDLED / f"{name}.toml"
+
+
+def read_algebra(path: Path) -> AlgebraSpec:
+    """Read and check an algebra's spec file."""
+    try:
+        if not path.is_file():
+            raise UsageError(f"{path.name}: not a readable file")
+        if path.stat().st_size > MAXIMUM_BYTES:
+            raise UsageError(f"{path.name}: larger than {MAXIMUM_BYTES} bytes, the cap for a spec")
+        text = path.read_bytes().decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path.name}: cannot be read: {error}") from error
+    return parse_algebra(text, path.name)
+
+
+def parse_algebra(text: str, file: str) -> AlgebraSpec:
+    """Check the text of an algebra's spec; `file` names it in messages.
+
+    Raises UsageError naming the file, the key, what is allowed and the nearest allowed word.
+    """
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise UsageError(f"{file}: not valid TOML: {error}") from error
+    reader = _Reader(file)
+    reader.known_keys(data, KEYS, "")
+    algebra = reader.algebra(data)
+    elements = reader.elements(data, algebra)
+    groups = reader.groups(data, algebra, elements)
+    requests = reader.requests(data, elements)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    description = reader.text(data, "description", "")
+    return AlgebraSpec(file, description, digest, algebra, elements, groups, requests)
+
+
+class _Reader:
+    """Turns TOML values into checked ones; every message begins with the file's name."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+
+    def fail(self, where: str, message: str) -> UsageError:
+        return UsageError(
+            f"{self.file}: {where}: {message}" if where else f"{self.file}: {message}"
+        )
+
+    def known_keys(self, table: Mapping[str, Any], allowed: tuple[str, ...], where: str) -> None:
+        for key in table:
+            if key not in allowed:
+                raise self.fail(
+                    where,
+                    f'unknown key "{key}"; allowed are {", ".join(allowed)}.'
+                    + suggest(key, allowed),
+                )
+
+    def text(
+        self, table: Mapping[str, Any], key: str, where: str, default: str | None = None
+    ) -> str:
+        value = table.get(key, default)
+        if not isinstance(value, str):
+            raise self.fail(
+                where, f'"{key}" must be a text' + ("" if key in table else "; it is missing")
+            )
+        return value
+
+    def name(self, table: Mapping[str, Any], key: str, where: str) -> str:
+        value = self.text(table, key, where)
+        if not NAME.match(value):
+            raise self.fail(where, f'"{key}" = "{value}" must match [A-Za-z][A-Za-z0-9_]*')
+        return value
+
+    def rational(self, value: Any, where: str) -> Fraction:
+        if isinstance(value, bool) or not isinstance(value, int | str):
+            raise self.fail(
+                where, f'{value!r} must be an integer or a fraction in a text, like "-1/2"'
+            )
+        try:
+            return Fraction(value)
+        except (ValueError, ZeroDivisionError) as error:
+            raise self.fail(where, f"{value!r} is not a fraction") from error
+
+    def table(self, value: Any, where: str) -> dict[str, Any]:
+        if not isinstance(value, dict):
+            raise self.fail(where, "must be a table")
+        return value
+
+    def array(self, value: Any, where: str) -> list[Any]:
+        if not isinstance(value, list):
+            raise self.fail(where, "must be an array")
+        return value
+
+    def algebra(self, data: Mapping[str, Any]) -> Algebra:
+        name = self.name(data, "name", "")
+        basis = self.array(data.get("basis"), "basis")
+        for vector in basis:
+            if not isinstance(vector, str) or not re.fullmatch(r"e[0-9a-z]", vector):
+                raise self.fail("basis", f'"{vector}" must be "e" and one digit or small letter')
+        if len(set(basis)) != len(basis):
+            raise self.fail("basis", "a basis vector is listed twice")
+        if not 1 <= len(basis) <= MAXIMUM_DIMENSION:
+            raise self.fail(
+                "basis",
+                f"{len(basis)} vectors; 1 to {MAXIMUM_DIMENSION} are allowed "
+                "(MAXIMUM_DIMENSION in codegen/spec.py lifts the cap)",
+            )
+        gram = self.table(data.get("gram"), "gram")
+        self.known_keys(gram, ("diagonal", "matrix"), "gram")
+        if len(gram) != 1:
+            raise self.fail("gram", 'needs exactly one of "diagonal" and "matrix"')
+        size = len(basis)
+        if "diagonal" in gram:
+            squares = [
+                self.rational(x, "gram.diagonal")
+                for x in self.array(gram["diagonal"], "gram.diagonal")
+            ]
+            if len(squares) != size:
+                raise self.fail("gram.diagonal", f"{len(squares)} numbers for {size} basis vectors")
+            rows = [
+                [squares[i] if i == j else Fraction(0) for j in range(size)] for i in range(size)
+            ]
+        else:
+            rows = [
+                [self.rational(x, "gram.matrix") for x in self.array(row, "gram.matrix")]
+                for row in self.array(gram["matrix"], "gram.matrix")
+            ]
+            if len(rows) != size or any(len(row) != size for row in rows):
+                raise self.fail(
+                    "gram.matrix", f"must be {size} × {size}, one row for each basis vector"
+                )
+            for i in range(size):
+                for j in range(i):
+                    if rows[i][j] != rows[j][i]:
+                        raise self.fail(
+                            "gram.matrix",
+                            f"not symmetric: {basis[i]}·{basis[j]} = {rows[i][j]} but "
+                            f"{basis[j]}·{basis[i]} = {rows[j][i]}",
+                        )
+        return Algebra(name, tuple(basis), tuple(tuple(row) for row in rows))
+
+    def blade(self, algebra: Algebra, text: Any, where: str) -> tuple[Blade, int]:
+        if not isinstance(text, str):
+            raise self.fail(where, f"{text!r} is not the name of a blade")
+        try:
+            return algebra.parse_blade(text)
+        except ValueError as error:
+            raise self.fail(where, str(error)) from error
+
+    def multivector(self, algebra: Algebra, value: Any, where: str) -> dict[Blade, Fraction]:
+        result: dict[Blade, Fraction] = {}
+        for text, coefficient in self.table(value, where).items():
+            blade, sign = self.blade(algebra, text, where)
+            if blade in result:
+                raise self.fail(where, f'"{text}" names a blade that is already there')
+            result[blade] = sign * self.rational(coefficient, f"{where}.{text}")
+        return {blade: x for blade, x in result.items() if x}
+
+    def elements(self, data: Mapping[str, Any], algebra: Algebra) -> dict[str, Element]:
+        elements: dict[str, Element] = {}
+        for name, entry in self.table(data.get("element", {}), "element").items():
+            where = f"element.{name}"
+            if not NAME.match(name):
+                raise self.fail(where, "must match [A-Za-z][A-Za-z0-9_]*")
+            table = self.table(entry, where)
+            self.known_keys(table, ("doc", "symbol", "blades", "unit", "fixed"), where)
+            components: list[Component] = []
+            fixed = self.multivector(algebra, table.get("fixed", {}), f"{where}.fixed")
+            seen: set[Blade] = set(fixed)
+            for text in self.array(table.get("blades"), f"{where}.blades"):
+                blade, _ = self.blade(algebra, text, f"{where}.blades")
+                if blade in seen:
+                    raise self.fail(
+                        f"{where}.blades", f'"{text}" names a blade that is already there'
+                    )
+                seen.add(blade)
+                components.append(blade_component(algebra, text))
+            unit = table.get("unit", False)
+            if not isinstance(unit, bool):
+                raise self.fail(f"{where}.unit", "must be true or false")
+            symbol = self.name(table, "symbol", where)
+            doc = self.text(table, "doc", where)
+            elements[name] = Element(name, symbol, tuple(components), fixed, unit, doc)
+        if "Scalar" in elements and elements["Scalar"].blades != (0,):
+            raise self.fail("element.Scalar", 'is the type of numbers; its blades must be ["s"]')
+        return elements
+
+    def groups(
+        self, data: Mapping[str, Any], algebra: Algebra, elements: Mapping[str, Element]
+    ) -> tuple[LieGroup, ...]:
+        groups: list[LieGroup] = []
+        for index, entry in enumerate(self.array(data.get("group", []), "group"), 1):
+            table = self.table(entry, f"group {index}")
+            name = self.name(table, "name", f"group {index}")
+            where = f"group {name}"
+            self.known_keys(table, ("name", "description", "element", "generators"), where)
+            if any(group.name.lower() == name.lower() for group in groups):
+                raise self.fail(where, "there are two groups of that name")
+            holder = self.text(table, "element", where)
+            if holder not in elements:
+                raise self.fail(
+                    where,
+                    f'unknown element "{holder}"; elements are {", ".join(elements)}.'
+                    + suggest(holder, elements),
+                )
+            generators: list[Generator] = []
+            for item in self.array(table.get("generators"), f"{where}.generators"):
+                one = self.table(item, f"{where}.generators")
+                self.known_keys(
+                    one, ("name", "bivector", "rate", "momentum"), f"{where}.generators"
+                )
+                generator = self.name(one, "name", f"{where}.generators")
+                bivector = self.multivector(
+                    algebra, one.get("bivector"), f"{where}.{generator}.bivector"
+                )
+                generators.append(
+                    Generator(
+                        generator,
+                        bivector,
+                        self.name(one, "rate", f"{where}.{generator}"),
+                        self.name(one, "momentum", f"{where}.{generator}"),
+                    )
+                )
+            for what in ("name", "rate", "momentum"):
+                names = [getattr(g, what) for g in generators]
+                if len(set(names)) != len(names):
+                    raise self.fail(where, f"two generators have the same {what}")
+            description = self.text(table, "description", where)
+            groups.append(
+                lie_group(
+                    algebra,
+                    name,
+                    description,
+                    elements[holder],
+                    tuple(generators),
+                    f"{self.file}: {where}",
+                )
+            )
+        return tuple(groups)
+
+    def requests(
+        self, data: Mapping[str, Any], elements: Mapping[str, Element]
+    ) -> tuple[Request, ...]:
+        requests: list[Request] = []
+        for operation, entries in self.table(data.get("kernels", {}), "kernels").items():
+            if operation not in OPERATIONS:
+                raise self.fail(
+                    "kernels",
+                    f'unknown operation "{operation}"; known are {", ".join(OPERATIONS)}.'
+                    + suggest(operation, OPERATIONS),
+                )
+            where = f"kernels.{operation}"
+            for text in self.array(entries, where):
+                if not isinstance(text, str):
+                    raise self.fail(
+                        where, f'{text!r} must be a text such as "Motor Motor -> Motor"'
+                    )
+                left, arrow, right = text.partition("->")
+                words = left.split()
+                grade: int | None = None
+                if operation == "grade" and len(words) == 2 and words[1].isdigit():
+                    grade = int(words.pop())
+                if len(words) != OPERATIONS[operation] or (arrow and len(right.split()) != 1):
+                    raise self.fail(
+                        where,
+                        f'"{text}" must be {OPERATIONS[operation]} element name(s)'
+                        + (" and a grade" if operation == "grade" else "")
+                        + ', then perhaps "-> RESULT"',
+                    )
+                for word in [*words, *right.split()]:
+                    if word not in elements:
+                        raise self.fail(
+                            where,
+                            f'"{text}": unknown element "{word}"; elements are '
+                            f"{', '.join(elements)}." + suggest(word, elements),
+                        )
+                request = Request(operation, tuple(words), right.strip() or None, grade)
+                if request in requests:
+                    raise self.fail(where, f'"{text}" is listed twice')
+                requests.append(request)
+        return tuple(requests)

@@ -1,0 +1,206 @@
+// The scalar operations that generated kernels are written in.
+//
+// Kernels are templates over a scalar S: float, double, long double, __float128, an exact integer or
+// rational, a pack of lanes.  Everything they need beyond + - * / stands here, once, so that a
+// scalar type is adapted in one place.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <type_traits>
+
+namespace hamotor {
+
+/// a b + c in a fixed order: one rounding where the hardware has a fused multiply-add, two where it
+/// has not (a software fma is ten times slower).  The only customisation point of the products.
+template <class S>
+[[nodiscard]] constexpr S mul_add(const S& a, const S& b, const S& c) noexcept {
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+  if constexpr (std::is_same_v<S, double>) {
+    return __builtin_fma(a, b, c);
+  } else if constexpr (std::is_same_v<S, float>) {
+    return __builtin_fmaf(a, b, c);
+  } else {
+    return a * b + c;
+  }
+#else
+  return a * b + c;
+#endif
+}
+
+/// `a` where the condition holds, else `b`: both are evaluated, so that lanes share one text.
+template <class S>
+[[nodiscard]] constexpr S select(bool condition, const S& a, const S& b) noexcept {
+  return condition ? a : b;
+}
+
+/// Whether `mul_add` rounds once for double.
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+inline constexpr bool has_fused_multiply_add = true;
+#else
+inline constexpr bool has_fused_multiply_add = false;
+#endif
+
+/// An unevaluated sum hi + lo, |lo| ≤ ulp(hi)/2: about twice the digits of S.
+template <class S>
+struct DoubleWord {
+  S hi;
+  S lo;
+};
+
+/// Sine and cosine of one angle.
+template <class S>
+struct Turn {
+  S sin;
+  S cos;
+};
+
+namespace scalar {
+
+template <class S>
+[[nodiscard]] constexpr S sqrt(const S& x) noexcept {
+  using std::sqrt;
+  return sqrt(x);
+}
+
+template <class S>
+[[nodiscard]] constexpr S sin(const S& x) noexcept {
+  using std::sin;
+  return sin(x);
+}
+
+template <class S>
+[[nodiscard]] constexpr S cos(const S& x) noexcept {
+  using std::cos;
+  return cos(x);
+}
+
+template <class S>
+[[nodiscard]] constexpr S atan2(const S& y, const S& x) noexcept {
+  using std::atan2;
+  return atan2(y, x);
+}
+
+template <class S>
+[[nodiscard]] constexpr S abs(const S& x) noexcept {
+  return select(x < S(0), -x, x);
+}
+
+/// Largest of the absolute values.
+template <class S, std::same_as<S>... Rest>
+[[nodiscard]] constexpr S max_abs(const S& x, const Rest&... rest) noexcept {
+  S largest = abs(x);
+  ((largest = select(abs(rest) > largest, abs(rest), largest)), ...);
+  return largest;
+}
+
+/// π, correctly rounded to S.
+template <class S>
+[[nodiscard]] constexpr S pi() noexcept {
+  return S(3.141592653589793238462643383279502884L);
+}
+
+/// 2^exponent, exact.
+template <class S>
+[[nodiscard]] constexpr S power_of_two(int exponent) noexcept {
+  S result(1);
+  const S factor = exponent < 0 ? S(0.5) : S(2);
+  for (int i = exponent < 0 ? -exponent : exponent; i > 0; --i) result = result * factor;
+  return result;
+}
+
+/// A power of two that brings numbers of size `largest` to where squares and products neither
+/// overflow nor vanish: 1 almost always.
+template <class S>
+[[nodiscard]] constexpr S range_scale(const S& largest) noexcept {
+  constexpr int half = std::numeric_limits<S>::max_exponent / 2;
+  constexpr S large = power_of_two<S>(half - 12);
+  constexpr S small = power_of_two<S>(12 - half);
+  constexpr S shrink = power_of_two<S>(-half - 12);
+  constexpr S grow = power_of_two<S>(half + 12);
+  return select(largest > large, shrink, select(largest < small, grow, S(1)));
+}
+
+/// The rounding error of a product: a b = product + product_error exactly (barring underflow).
+template <class S>
+[[nodiscard]] constexpr S product_error(const S& a, const S& b, const S& product) noexcept {
+  using std::fma;
+  return fma(a, b, -product);
+}
+
+/// a + b as an exact double-word (Knuth's two-sum).
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> two_sum(const S& a, const S& b) noexcept {
+  const S sum = a + b;
+  const S shadow = sum - a;
+  return {sum, (a - (sum - shadow)) + (b - shadow)};
+}
+
+namespace detail {
+
+template <class S>
+constexpr void accumulate(S&, S&) noexcept {}
+
+template <class S, class... Rest>
+constexpr void accumulate(S& sum, S& low, const S& a, const S& b, const Rest&... rest) noexcept {
+  const S product = a * b;
+  const auto total = two_sum(sum, product);
+  sum = total.hi;
+  low = low + (total.lo + product_error(a, b, product));
+  accumulate(sum, low, rest...);
+}
+
+}  // namespace detail
+
+/// a₁ b₁ + a₂ b₂ + … to about twice the working precision (Ogita, Rump & Oishi 2005, Dot2).
+template <class S, class... Rest>
+[[nodiscard]] constexpr DoubleWord<S> compensated_dot_pair(const S& a, const S& b,
+                                                           const Rest&... rest) noexcept {
+  S sum = a * b;
+  S low = product_error(a, b, sum);
+  detail::accumulate(sum, low, rest...);
+  return two_sum(sum, low);
+}
+
+/// a₁ b₁ + a₂ b₂ + … as if computed in twice the precision and rounded once.
+template <class S, class... Rest>
+[[nodiscard]] constexpr S compensated_dot(const S& a, const S& b, const Rest&... rest) noexcept {
+  return compensated_dot_pair(a, b, rest...).hi;
+}
+
+/// √x of a double-word number ≥ 0; 0 for 0.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_sqrt(const DoubleWord<S>& x) noexcept {
+  const S root = sqrt(x.hi);
+  const S rest = -product_error(root, root, x.hi) + x.lo;
+  const S correction = select(root > S(0), rest / (root + root), S(0));
+  return two_sum(root, correction);
+}
+
+/// x / scale for a power of two, exact barring underflow.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_unscale(const DoubleWord<S>& x,
+                                                          const S& scale) noexcept {
+  return {x.hi / scale, x.lo / scale};
+}
+
+/// a / b of double-word numbers, to about twice the working precision.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_ratio(const DoubleWord<S>& a,
+                                                        const DoubleWord<S>& b) noexcept {
+  const S quotient = a.hi / b.hi;
+  const S rest = -product_error(quotient, b.hi, a.hi);
+  return {quotient, (rest + a.lo - quotient * b.lo) / b.hi};
+}
+
+/// sin and cos of a double-word angle, each as accurate as the scalar's own sin and cos.
+template <class S>
+[[nodiscard]] constexpr Turn<S> sin_cos(const DoubleWord<S>& angle) noexcept {
+  const S sine = sin(angle.hi);
+  const S cosine = cos(angle.hi);
+  return {mul_add(angle.lo, cosine, sine), mul_add(-angle.lo, sine, cosine)};
+}
+
+}  // namespace scalar
+}  // namespace hamotor
