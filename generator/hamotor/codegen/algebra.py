@@ -1,4 +1,4 @@
-"""A Clifford algebra over any symmetric rational Gram matrix: basis blades and their exact products.
+"""A Clifford algebra over any symmetric rational Gram matrix: blades and their exact products.
 
 A basis blade is a bit mask over the basis vectors and stands for their *outer* product in
 ascending order.  In a null or otherwise oblique basis the outer product of two basis vectors is not

@@ -87,7 +87,7 @@ def reversed_value(value: Mapping[Blade, Polynomial]) -> PolynomialMultivector:
 
 
 def direct_program(
-    parameters: tuple[Parameter, ...], meaning: Mapping[str, Polynomial], result: Element
+    parameters: tuple[Parameter, ...], meaning: Mapping[str, Polynomial], result: Element | None
 ) -> Program:
     """The program that evaluates each polynomial as it stands."""
     outputs = tuple((name, polynomial_expression(p)) for name, p in meaning.items())
@@ -102,7 +102,6 @@ def proved(kernel: Kernel) -> Kernel:
 
 
 def product_kernel(
-    algebra: Algebra,
     name: str,
     law: str,
     product: Callable[[Blade, Blade], Multivector],

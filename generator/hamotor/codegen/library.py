@@ -93,7 +93,7 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
                 spec, apply_bilinear(product, value_of(a), value_of(b)), where
             )
         name = request.operation
-        return product_kernel(algebra, name, LAWS[name], product, left, right, result)
+        return product_kernel(name, LAWS[name], product, left, right, result)
     if request.operation == "sandwich":
         versor, operand = operands
         if not versor.unit or any(g % 2 for g in versor.grades):
@@ -176,7 +176,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         result: Element,
         factor: Fraction = Fraction(1),
     ) -> Kernel:
-        return product_kernel(algebra, name, law, table, left, right, result, namespace, factor)
+        return product_kernel(name, law, table, left, right, result, namespace, factor)
 
     kernels = [
         product("ad", "ad_a b = [a, b] = a b − b a", bracket, rate, rate, rate),

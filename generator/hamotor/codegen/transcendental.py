@@ -75,7 +75,7 @@ class Plane:
 
 def split_bivectors(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
     """Split the bivector blades; raises UsageError where the closed forms here do not apply."""
-    names = {b: {(algebra.blade_name(b),): Fraction(1)} for b in blades}
+    names: PolynomialMultivector = {b: {(algebra.blade_name(b),): Fraction(1)} for b in blades}
     square = poly.apply_bilinear(algebra.geometric, names, names)
     rotation = [
         b for b in blades if square.get(0, {}).get((algebra.blade_name(b),) * 2, Fraction(0))
@@ -145,7 +145,7 @@ def _coefficients(
 
 
 def _outputs(
-    algebra: Algebra, values: Mapping[Blade, Expression], result: Element
+    values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
     """Read the components of the result off named blade coefficients."""
     names: PolynomialMultivector = {b: {(f"#{b}",): Fraction(1)} for b in values}
@@ -227,11 +227,11 @@ def exp_kernel(
                 u, sign = plane.along[v]
                 terms = MultiplyAdd(along, signed(sign, ws[u]), terms)
             out[v] = Product(unscale, terms)
-        out[_quadrivector(algebra, plane)] = Product(unscale, Product(sine, pitch))
+        out[_quadrivector(plane)] = Product(unscale, Product(sine, pitch))
     else:
         for v in plane.translation:
             out[v] = Product(sinc, b[v])
-    program = Program((parameter,), tuple(writer.bindings), _outputs(algebra, out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
     return Kernel(
         "exp",
         "exp(B) = 1 + B + B²/2 + …",
@@ -243,7 +243,7 @@ def exp_kernel(
     )
 
 
-def _quadrivector(algebra: Algebra, plane: Plane) -> Blade:
+def _quadrivector(plane: Plane) -> Blade:
     u, v, _ = plane.pitch[0]
     return u | v
 
@@ -275,7 +275,7 @@ def log_kernel(
         unscale = writer.let("q_unscale", Quotient(ONE, vs_scale))
         dot = writer.let("dot", call("compensated_dot_pair", *_dot_terms(plane, ws, vs)))
         writer.let("share", call("double_word_ratio", dot, squares))
-        quad = _quadrivector(algebra, plane)
+        quad = _quadrivector(plane)
         pss = Product(vs_scale, m[quad])
         norm2 = MultiplyAdd(scalar, scalar, Product(sine, sine))
         pitch = writer.let(
@@ -292,10 +292,7 @@ def log_kernel(
         for u in plane.rotation:
             v, sign = next((v, s) for v, (w, s) in plane.along.items() if w == u)
             axis: Expression = Product(over, signed(sign, vs[v]))
-            if u == first:
-                axis = Select(length, axis, half_turn)
-            else:
-                axis = Select(length, axis, ZERO)
+            axis = Select(length, axis, half_turn if u == first else ZERO)
             out[u] = Select(sine_s, out[u], axis)
         straight = writer.let("straight", Quotient(ONE, scalar))
         for v in plane.translation:
@@ -325,7 +322,7 @@ def log_kernel(
                 )
         first = plane.rotation[0]
         out[first] = Select(sine_s, out[first], half_turn)
-    program = Program((parameter,), tuple(writer.bindings), _outputs(algebra, out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
     return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
 
@@ -350,7 +347,7 @@ def cayley_kernel(
     }
     square = poly.apply_bilinear(algebra.geometric, value, value)
     s = staging.bind("s", square.get(0, {}))
-    inverse = _named(
+    _named(
         staging,
         "inverse",
         Quotient(ONE, polynomial_expression(poly_sum({(): Fraction(1)}, s, Fraction(-1)))),
@@ -372,7 +369,7 @@ def cayley_kernel(
         out[b] = (
             MultiplyAdd(Name("w_factor"), polynomial_expression(extra), first) if extra else first
         )
-    program = Program((parameter,), tuple(staging.bindings), _outputs(algebra, out, result), result)
+    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
     return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace)
 
 
@@ -417,7 +414,7 @@ def cayley_inverse_kernel(
             out[b] = MultiplyAdd(Name("slope"), signed(-int(x), Name(other)), first)
         else:
             out[b] = first
-    program = Program((parameter,), tuple(staging.bindings), _outputs(algebra, out, result), result)
+    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
     return Kernel(
         "cayley_inverse",
         "(M − 1)(M + 1)⁻¹, M ~M = 1",
@@ -468,7 +465,7 @@ def normalize_kernel(algebra: Algebra, operand: Element, result: Element) -> Ker
                 out[b] = first
     else:
         out = {b: polynomial_expression(p) for b, p in scaled.items()}
-    program = Program((parameter,), tuple(staging.bindings), _outputs(algebra, out, result), result)
+    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
     return Kernel(
         "normalize",
         "M (~M M)^(−1/2): the unit versor nearest to M",
