@@ -1,0 +1,71 @@
+"""Hamotor: Hamiltonian mechanics on rotor groups, as generated C++ that Python can run.
+
+    import hamotor
+
+    run = hamotor.load("dzhanibekov").run(end=10)
+    run.t                        # (n,) seconds
+    run.motor("handle")          # (n, 8) body to world
+    run.rotation("handle")       # (n, 3, 3)
+    print(run.summary())
+
+Everything is in SI units.  Motors take the body frame to the world, X_world = M X_body M̃; momenta
+are components in the body frame.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hamotor.errors import HamotorError, NumericsError, ToolError, UsageError
+
+if TYPE_CHECKING:
+    from hamotor.run.comparison import Comparison, compare
+    from hamotor.run.dataset import read_trajectory
+    from hamotor.run.result import Run, RunFailed, RunInterrupted, open_run
+    from hamotor.run.simulation import Simulation, load
+
+__version__ = "0.1.0"
+
+# Loaded on first use: `hamotor list` should not wait for NumPy.
+_HOMES = {
+    "Comparison": "hamotor.run.comparison",
+    "compare": "hamotor.run.comparison",
+    "read_trajectory": "hamotor.run.dataset",
+    "Run": "hamotor.run.result",
+    "RunFailed": "hamotor.run.result",
+    "RunInterrupted": "hamotor.run.result",
+    "open_run": "hamotor.run.result",
+    "Simulation": "hamotor.run.simulation",
+    "load": "hamotor.run.simulation",
+}
+
+__all__ = [
+    "Comparison",
+    "HamotorError",
+    "NumericsError",
+    "Run",
+    "RunFailed",
+    "RunInterrupted",
+    "Simulation",
+    "ToolError",
+    "UsageError",
+    "__version__",
+    "compare",
+    "load",
+    "open_run",
+    "read_trajectory",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hamotor' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

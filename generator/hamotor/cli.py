@@ -1,0 +1,429 @@
+"""The command line: arguments in, a call of the API, text out.
+
+Data goes to stdout, messages and progress to stderr.  Exit: 0 fine, 1 a check failed, 2 bad usage
+or input, 3 the numerics failed, 4 a tool is missing or compilation failed, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NoReturn
+
+from hamotor import __version__
+from hamotor.errors import CheckFailed, HamotorError, UsageError, suggest
+
+if TYPE_CHECKING:
+    from hamotor.run.result import Run
+
+Command = Callable[[argparse.Namespace], int]
+
+_EXAMPLES = """\
+examples:
+  ./hamotor run dzhanibekov                 run a bundled scene; files go to runs/dzhanibekov
+  ./hamotor run my.toml --end 5 --step 1e-3 --out somewhere
+  ./hamotor run tumble --tolerance 1e-9 --json > tumble.json
+  ./hamotor new > my.toml                   a commented scene to start from
+  ./hamotor show heavy_top                  what a scene models and conserves
+  ./hamotor show pga3 gp motor motor        one generated kernel with its cost
+  ./hamotor compare runs/a runs/b --tolerance 1e-9
+
+exit codes: 0 fine, 1 a check failed, 2 bad usage or input, 3 the numerics failed,
+            4 a tool is missing or compilation failed, 130 interrupted
+"""
+
+_RUN_EXAMPLES = """\
+examples:
+  ./hamotor run dzhanibekov
+  ./hamotor run tumble --method rkmk4 --step 0.001 --end 100 --every 100
+  ./hamotor run spring_pendulum --tolerance 1e-10 --csv --out runs/pendulum
+
+The folder then holds run.json (the account of the run), trajectory/ (Parquet), path.png and
+conserved.png.  An earlier run there is replaced, anything else is left alone.
+"""
+
+_COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test")
+_LATER_COMMANDS = {"bench": "benchmarks"}
+_LATER_RUN_OPTIONS = {
+    "ensemble": "--ensemble",
+    "seed": "--seed",
+    "threads": "--threads",
+    "engine": "--engine",
+}
+_LATER_GENERATE_OPTIONS = {
+    "signature": "--signature",
+    "null_pairs": "--null-pairs",
+    "name": "--name",
+}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code.  Prints no traceback for what users can cause."""
+    try:
+        code = _dispatch(list(sys.argv[1:] if arguments is None else arguments))
+        sys.stdout.flush()
+        return code
+    except HamotorError as error:
+        _say(f"hamotor: error: {error}")
+        return error.exit_code
+    except KeyboardInterrupt:
+        _say("hamotor: interrupted")
+        return 130
+    except BrokenPipeError:
+        # The reader of our output has seen enough.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        _say(f"hamotor: error: {error}")
+        return 2
+
+
+def _dispatch(words: list[str]) -> int:
+    parser = _parser()
+    if not words:
+        parser.print_help(sys.stderr)
+        return 2
+    if not words[0].startswith("-") and words[0] not in _COMMANDS:
+        _refuse_command(words[0])
+    parsed = parser.parse_args(words)
+    command: Command = parsed.command
+    return command(parsed)
+
+
+def _refuse_command(word: str) -> NoReturn:
+    if word in _LATER_COMMANDS:
+        raise UsageError(f'"{word}" ({_LATER_COMMANDS[word]}) is not in this version yet.')
+    raise UsageError(
+        f'unknown command "{word}"; commands are {", ".join(_COMMANDS)}.{suggest(word, _COMMANDS)}'
+    )
+
+
+def _program_name() -> str:
+    """As the user called it: by the launcher of a checkout, or as an installed command."""
+    started = Path(sys.argv[0]).name
+    return "./hamotor" if started == "__main__.py" else started
+
+
+class _Parser(argparse.ArgumentParser):
+    """argparse with our kind of error: one line, and a suggestion for a mistyped option."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message[:1].lower()}{message[1:]}; see {self.prog} --help")
+
+    def parse_known_args(  # type: ignore[no-untyped-def]
+        self, args=None, namespace=None
+    ):
+        parsed, unknown = super().parse_known_args(args, namespace)
+        for word in unknown:
+            if word.startswith("-"):
+                options = [o for action in self._actions for o in action.option_strings]
+                option = word.partition("=")[0]
+                hint = suggest(option, options)
+                raise UsageError(f"unknown option {option}.{hint} See {self.prog} --help")
+        return parsed, unknown
+
+
+def _parser() -> _Parser:
+    parser = _Parser(
+        prog=_program_name(),
+        description="Hamiltonian mechanics on rotor groups, as generated C++.",
+        epilog=_EXAMPLES,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=f"hamotor {__version__}")
+    commands = parser.add_subparsers(metavar="COMMAND", required=True, parser_class=_Parser)
+
+    def command(name: str, what: str, run: Command, epilog: str = "") -> _Parser:
+        made: _Parser = commands.add_parser(
+            name,
+            help=what,
+            description=what[:1].upper() + what[1:] + ".",
+            epilog=epilog,
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+            allow_abbrev=False,
+        )
+        made.set_defaults(command=run)
+        return made
+
+    _add_run(command("run", "integrate a scene", _run, _RUN_EXAMPLES))
+    _add_generate(command("generate", "write the generated C++ of algebras", _generate))
+    show = command(
+        "show", "explain a scene (SCENE) or print one kernel (ALGEBRA PRODUCT OPERAND…)", _show
+    )
+    show.add_argument("what", metavar="SCENE | ALGEBRA", help="a scene, or an algebra")
+    show.add_argument("words", metavar="PRODUCT OPERAND", nargs="*", help="product and operands")
+    table = command("table", "print the Cayley table of a product", _table)
+    table.add_argument("algebra", metavar="ALGEBRA")
+    table.add_argument("product", metavar="PRODUCT")
+    listing = command("list", "list what there is", _list)
+    listing.add_argument("what", metavar="algebras|scenes|methods")
+    new = command("new", "print a commented starter file to stdout", _new)
+    new.add_argument("what", metavar="scene|algebra", nargs="?", default="scene")
+    compare = command("compare", "show how far two runs are apart", _compare)
+    compare.add_argument("one", metavar="RUN", help="folder of a run")
+    compare.add_argument("other", metavar="RUN", help="folder of another run")
+    compare.add_argument(
+        "--tolerance",
+        metavar="E",
+        type=_non_negative,
+        help="exit with 1 if any difference, in its unit, is above E",
+    )
+    test = command("test", "run all checks and tests", _test)
+    test.add_argument("--fast", action="store_true", help="leave out what takes long")
+    return parser
+
+
+def _add_run(parser: _Parser) -> None:
+    parser.add_argument("scene", metavar="SCENE", help="a bundled scene, or the path of a file")
+    parser.add_argument("--method", metavar="NAME", help="see: ./hamotor list methods")
+    accuracy = parser.add_mutually_exclusive_group()
+    accuracy.add_argument("--step", metavar="H", type=_positive, help="step, s")
+    accuracy.add_argument(
+        "--tolerance",
+        metavar="E",
+        type=_positive,
+        help="halve the step until the final state changes by at most E",
+    )
+    parser.add_argument("--end", metavar="T", type=_positive, help="end time, s")
+    parser.add_argument("--every", metavar="N", type=_count, help="record every N-th step")
+    parser.add_argument("--scalar", metavar="S", default="double", help="double|float|long_double")
+    parser.add_argument("--kernels", metavar="K", default="generated", help="generated")
+    parser.add_argument("--out", metavar="DIR", help="where to write (default: runs/SCENE)")
+    parser.add_argument("--csv", action="store_true", help="write trajectory.csv as well")
+    parser.add_argument(
+        "--json", action="store_true", help="print run.json on stdout, not the summary"
+    )
+    parser.add_argument("--no-pictures", action="store_true", help="draw nothing")
+    parser.add_argument("--representation", default="ga", help=argparse.SUPPRESS)
+    for option in _LATER_RUN_OPTIONS.values():
+        parser.add_argument(option, nargs="?", const=True, help=argparse.SUPPRESS)
+
+
+def _add_generate(parser: _Parser) -> None:
+    parser.add_argument("names", metavar="NAME", nargs="*", help="algebras (default: all bundled)")
+    parser.add_argument(
+        "--check", action="store_true", help="write nothing; exit with 1 if a file is out of date"
+    )
+    parser.add_argument("--out", metavar="DIR", help="write there instead of generated/")
+    for option in _LATER_GENERATE_OPTIONS.values():
+        parser.add_argument(option, nargs="?", const=True, help=argparse.SUPPRESS)
+
+
+def _refuse_later_options(parsed: argparse.Namespace, later: dict[str, str]) -> None:
+    for name, option in later.items():
+        if getattr(parsed, name) is not None:
+            raise UsageError(f"{option} is not in this version yet.")
+
+
+def _positive(text: str) -> float:
+    number = _finite(text)
+    if number <= 0:
+        raise argparse.ArgumentTypeError(f'must be greater than zero, not "{text}"')
+    return number
+
+
+def _non_negative(text: str) -> float:
+    number = _finite(text)
+    if number < 0:
+        raise argparse.ArgumentTypeError(f'must not be negative, not "{text}"')
+    return number
+
+
+def _finite(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'must be a number, not "{text}"') from None
+    if number - number != 0:
+        raise argparse.ArgumentTypeError(f'must be finite, not "{text}"')
+    return number
+
+
+def _count(text: str) -> int:
+    try:
+        number = int(text)
+    except ValueError:
+        number = 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f'must be a whole number, at least 1, not "{text}"')
+    return number
+
+
+def _run(parsed: argparse.Namespace) -> int:
+    _refuse_later_options(parsed, _LATER_RUN_OPTIONS)
+    if parsed.representation != "ga":
+        raise UsageError(f'--representation "{parsed.representation}" is not in this version yet.')
+    if parsed.kernels == "generic":
+        raise UsageError('--kernels "generic" is not in this version yet.')
+    from hamotor.run.result import RunFailed, RunInterrupted
+    from hamotor.run.simulation import load
+
+    simulation = load(parsed.scene)
+    out = parsed.out or str(Path("runs") / simulation.name)
+    code = 0
+    try:
+        run = simulation.run(
+            end=parsed.end,
+            step=parsed.step,
+            tolerance=parsed.tolerance,
+            method=parsed.method,
+            every=parsed.every,
+            scalar=parsed.scalar,
+            kernels=parsed.kernels,
+            out=out,
+            csv=parsed.csv,
+            pictures=not parsed.no_pictures,
+            progress=True,
+        )
+    except RunFailed as failure:
+        run, code = failure.run, failure.exit_code
+        _say(f"hamotor: error: {failure}")
+    except RunInterrupted as interruption:
+        run, code = interruption.run, 130
+        _say("hamotor: interrupted; what was computed is kept")
+    _print_run(run, as_json=parsed.json)
+    return code
+
+
+def _print_run(run: Run, *, as_json: bool) -> None:
+    if as_json:
+        from hamotor.run.report import to_json
+
+        sys.stdout.write(to_json(run.report))
+    else:
+        print(run.summary())
+
+
+def _generate(parsed: argparse.Namespace) -> int:
+    _refuse_later_options(parsed, _LATER_GENERATE_OPTIONS)
+    from hamotor.codegen import generate
+
+    folder = Path(parsed.out) if parsed.out else None
+    shown = str(folder) if folder else "generated"
+    differences = generate(parsed.names, check=parsed.check, out=folder)
+    if parsed.check and differences:
+        listed = "\n".join(f"  {d.kind:<9} {shown}/{d.path}" for d in differences)
+        again = " ".join(["./hamotor generate", *parsed.names, *(["--out", shown] * bool(folder))])
+        raise CheckFailed(f"generated files are out of date:\n{listed}\nTo write them: {again}")
+    for difference in differences:
+        done = "removed" if difference.kind == "orphaned" else "wrote"
+        print(f"{done} {shown}/{difference.path}")
+    if not differences:
+        print(f"{shown}/ is up to date")
+    return 0
+
+
+def _show(parsed: argparse.Namespace) -> int:
+    from hamotor.codegen import bundled_algebras
+
+    if parsed.what in bundled_algebras():
+        if not parsed.words:
+            raise UsageError(
+                f"show {parsed.what}: name a product and its operands, for example: "
+                f"./hamotor show {parsed.what} gp motor motor"
+            )
+        from hamotor.codegen import show
+
+        print(show(parsed.what, parsed.words[0], parsed.words[1:]))
+        return 0
+    from hamotor.run.account import account
+    from hamotor.scene import bundled_scenes, read_scene
+
+    names = [name for name, _ in bundled_scenes()]
+    known = [*bundled_algebras(), *names]
+    if parsed.what not in names and not Path(parsed.what).exists():
+        raise UsageError(
+            f'"{parsed.what}" is neither an algebra ({", ".join(bundled_algebras())}) nor a scene '
+            f"({', '.join(names)}) nor a file.{suggest(parsed.what, known)}"
+        )
+    if parsed.words:
+        raise UsageError(f'show SCENE: "{" ".join(parsed.words)}" is not in this version yet.')
+    print(account(read_scene(parsed.what)))
+    return 0
+
+
+def _table(parsed: argparse.Namespace) -> int:
+    from hamotor.codegen import table
+
+    print(table(parsed.algebra, parsed.product))
+    return 0
+
+
+def _list(parsed: argparse.Namespace) -> int:
+    listings = {"algebras": _algebras, "scenes": _scenes, "methods": _methods}
+    if parsed.what not in listings:
+        raise UsageError(
+            f'nothing to list under "{parsed.what}"; there are {", ".join(listings)}.'
+            f"{suggest(parsed.what, listings)}"
+        )
+    entries = listings[parsed.what]()
+    width = max((len(name) for name, _ in entries), default=0)
+    for name, what in entries:
+        print(f"{name.ljust(width)}  {what}".rstrip())
+    return 0
+
+
+def _algebras() -> list[tuple[str, str]]:
+    from hamotor.codegen import bundled_algebras
+
+    return [(name, "") for name in bundled_algebras()]
+
+
+def _scenes() -> list[tuple[str, str]]:
+    from hamotor.scene import bundled_scenes
+
+    return bundled_scenes()
+
+
+def _methods() -> list[tuple[str, str]]:
+    return [
+        ("auto", "what suits the scene; run.json says which and why"),
+        ("rkmk4", "Runge-Kutta-Munthe-Kaas, order 4, explicit"),
+        ("splitting2", "Strang splitting, order 2, symplectic, keeps coadjoint orbits exactly"),
+    ]
+
+
+def _new(parsed: argparse.Namespace) -> int:
+    if parsed.what == "scene":
+        from hamotor.scene import starter_scene
+
+        print(starter_scene(), end="")
+        return 0
+    if parsed.what == "algebra":
+        from hamotor.codegen.spec import bundled_path
+
+        # A real one: the smallest algebra that is complete, with every key it can have.
+        print(bundled_path("pga2").read_text(encoding="utf-8"), end="")
+        return 0
+    allowed = ("scene", "algebra")
+    raise UsageError(
+        f'no starter for "{parsed.what}"; there are scene and algebra.'
+        f"{suggest(parsed.what, allowed)}"
+    )
+
+
+def _compare(parsed: argparse.Namespace) -> int:
+    from hamotor.run.comparison import compare, table
+    from hamotor.run.result import open_run
+
+    comparison = compare(open_run(parsed.one), open_run(parsed.other))
+    print(table(comparison))
+    if parsed.tolerance is not None and not comparison.largest <= parsed.tolerance:
+        raise CheckFailed(
+            f"the runs differ by {comparison.largest:.3g}, more than {parsed.tolerance:g}."
+        )
+    return 0
+
+
+def _test(parsed: argparse.Namespace) -> int:
+    from hamotor.testing import run_tests
+
+    return run_tests(fast=parsed.fast)
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,125 @@
+"""What a scene models, in words: `hamotor show SCENE`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hamotor.scene import Body, Gravity, Interaction, Scene, Spring
+
+
+def account(scene: Scene) -> str:
+    """What is modelled, what is left out, what is conserved and how it is integrated."""
+    blocks = [
+        [f"{scene.name}: {scene.description}" if scene.description else scene.name],
+        [f"group  {scene.group.name} in {scene.group.algebra}, {_state_size(scene)} numbers"],
+    ]
+    blocks += [_body(body) for body in scene.bodies]
+    if scene.interactions:
+        blocks.append(["acting"])
+        blocks[-1] += [f"  {_interaction(interaction)}" for interaction in scene.interactions]
+    blocks.append(["conserved", *_conserved(scene)])
+    blocks.append(["left out", *(f"  {line}" for line in _left_out(scene))])
+    blocks.append(["time", *(f"  {line}" for line in _time(scene))])
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _state_size(scene: Scene) -> int:
+    return len(scene.bodies) * (len(scene.group.motor) + len(scene.group.generators))
+
+
+def _body(body: Body) -> list[str]:
+    lines = [f"body {body.name}", f"  mass               {body.mass:g} kg"]
+    inertia = np.asarray(body.inertia)
+    off_diagonal = inertia - np.diag(np.diag(inertia))
+    if off_diagonal.any():
+        lines.append(f"  inertia            {_rows(inertia)} kg m^2, about the centre of mass")
+    else:
+        lines.append(
+            f"  inertia            {_numbers(np.diag(inertia))} kg m^2, about the centre of mass"
+        )
+    if any(body.center_of_mass):
+        lines.append(f"  centre of mass     {_numbers(body.center_of_mass)} m in the body frame")
+    rotations = body.group.rotations
+    rate = body.rate
+    lines.append(f"  position           {_numbers(body.position)} m")
+    if body.group.translates:
+        lines.append(f"  velocity           {_numbers(rate[rotations:])} m/s, body frame")
+    lines.append(f"  angular velocity   {_numbers(rate[:rotations])} rad/s, body frame")
+    if not body.group.translates:
+        lines.append("  turns about its position, which is fixed")
+    return lines
+
+
+def _interaction(interaction: Interaction) -> str:
+    from hamotor.scene import Gravity
+
+    return _gravity(interaction) if isinstance(interaction, Gravity) else _spring(interaction)
+
+
+def _gravity(gravity: Gravity) -> str:
+    return f"gravity {_numbers(gravity.acceleration)} m/s^2 on every body"
+
+
+def _spring(spring: Spring) -> str:
+    end = (
+        f"the point {_numbers(spring.anchor or ())} of the world"
+        if spring.other is None
+        else f"{_numbers(spring.other_at or ())} of {spring.other}"
+    )
+    return (
+        f"spring from {_numbers(spring.at)} of {spring.body} to {end}, "
+        f"{spring.stiffness:g} N/m, rest length {spring.rest_length:g} m"
+    )
+
+
+def _conserved(scene: Scene) -> list[str]:
+    width = max(len(quantity.name) for quantity in scene.conserved)
+    return [
+        f"  {quantity.name.ljust(width)}  {quantity.description} ({quantity.unit})"
+        for quantity in scene.conserved
+    ]
+
+
+def _left_out(scene: Scene) -> list[str]:
+    lines = []
+    if not scene.interactions:
+        lines.append("potentials: nothing acts, so steps have no kick")
+    if not scene.group.translates:
+        lines.append("translation: the reaction at the fixed point is not computed")
+    if scene.group.dimension == 2:
+        lines.append("the third dimension")
+    lines.append("dilation, contact, friction and damping")
+    return lines
+
+
+def _time(scene: Scene) -> list[str]:
+    time = scene.time
+    lines = [f"end        {time.end:g} s"]
+    if time.step is not None:
+        lines.append(f"step       {time.step:g} s")
+    if time.tolerance is not None:
+        lines.append(f"tolerance  {time.tolerance:g}")
+    lines += [f"method     {time.method}", f"recorded   every {_ordinal(scene.output.every)} step"]
+    return lines
+
+
+def _ordinal(number: int) -> str:
+    if number == 1:
+        return "single"
+    if number % 100 not in {11, 12, 13}:
+        ending = {1: "st", 2: "nd", 3: "rd"}.get(number % 10, "th")
+    else:
+        ending = "th"
+    return f"{number}{ending}"
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return "(" + ", ".join(f"{float(value):.6g}" for value in values) + ")"
+
+
+def _rows(matrix: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> str:
+    return "(" + ", ".join(_numbers(row) for row in matrix) + ")"

@@ -1,0 +1,289 @@
+"""From the C++ text of a scene to a shared library, compiled once and kept.
+
+The library's place in the cache is the SHA-256 of everything that decides its bits: the source, the
+headers it may include, the compiler's identity, the flags and the processor (`-march=native`).
+An unchanged scene therefore never runs the compiler again, not even to ask for its version.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from hamotor.errors import ToolError
+
+REPOSITORY = Path(__file__).resolve().parents[3]
+"""The checkout this package runs from: `generated/` and `runtime/` lie here."""
+
+_HEADER_SUFFIXES = {".h", ".hh", ".hpp", ".hxx", ".inc", ".ipp"}
+_ERRORS_SHOWN = 3
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """A C++ compiler: the command that starts it and the first line of its `--version`."""
+
+    command: tuple[str, ...]
+    version: str
+
+
+@dataclass(frozen=True)
+class CompiledScene:
+    """A shared library with the scene's C ABI, and how it came to be.
+
+    `compile_s` is the time spent compiling in this call, in seconds: 0 when `cached`.
+    """
+
+    library: Path
+    source: Path
+    compiler: str
+    flags: tuple[str, ...]
+    processor: str
+    compile_s: float
+    cached: bool
+
+
+def default_cache() -> Path:
+    """The folder of compiled scenes: $HAMOTOR_CACHE, or `.hamotor/cache` in the checkout."""
+    chosen = os.environ.get("HAMOTOR_CACHE")
+    if chosen:
+        return Path(chosen)
+    ours = REPOSITORY / ".hamotor" / "cache"
+    if os.access(ours if ours.exists() else REPOSITORY, os.W_OK):
+        return ours
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    return Path(base) / "hamotor"
+
+
+def default_includes() -> tuple[Path, ...]:
+    """The header folders a scene is compiled against."""
+    return (REPOSITORY / "generated", REPOSITORY / "runtime" / "include")
+
+
+def flags_for(machine: str) -> tuple[str, ...]:
+    """The flags every scene is compiled with on a machine of this kind.
+
+    `-ffp-contract=off` because the kernels say themselves where a multiply-add is fused; no
+    `-ffast-math`, because the order of the sums is part of the result.
+    """
+    native = "-mcpu=native" if machine in {"aarch64", "arm64"} else "-march=native"
+    return (
+        "-std=c++20",
+        "-O3",
+        native,
+        "-ffp-contract=off",
+        "-fno-math-errno",
+        "-shared",
+        "-fPIC",
+        "-fvisibility=hidden",
+    )
+
+
+def find_compiler(cache: Path) -> Compiler:
+    """The compiler in $CXX, or else g++, or else clang++.
+
+    Raises ToolError when there is none.  Its version is remembered by path, size and time of
+    change, so that a second call starts no process.
+    """
+    wanted = os.environ.get("CXX", "").strip()
+    if wanted:
+        command = tuple(shlex.split(wanted))
+        if shutil.which(command[0]) is None:
+            raise ToolError(
+                f'the compiler in $CXX, "{command[0]}", is not on the PATH. '
+                "Correct CXX or unset it to use g++ or clang++."
+            )
+        return Compiler(command, _version_of(command, cache))
+    for name in ("g++", "clang++"):
+        if shutil.which(name):
+            return Compiler((name,), _version_of((name,), cache))
+    raise ToolError(
+        "no C++ compiler found: neither $CXX nor g++ nor clang++. "
+        "Install one, for example: sudo apt-get install g++"
+    )
+
+
+def _version_of(command: tuple[str, ...], cache: Path) -> str:
+    identity = [_file_identity(word) for word in command]
+    known = json.dumps([command, identity])
+    remembered = cache / "compilers.json"
+    versions = _read_json_object(remembered)
+    version = versions.get(known)
+    if version is None:
+        try:
+            answer = subprocess.run(
+                [*command, "--version"], capture_output=True, text=True, check=True, timeout=60
+            )
+        except (OSError, subprocess.SubprocessError) as problem:
+            raise ToolError(f'"{shlex.join(command)} --version" failed: {problem}') from problem
+        version = answer.stdout.splitlines()[0].strip() if answer.stdout else command[0]
+        versions[known] = version
+        cache.mkdir(parents=True, exist_ok=True)
+        _write_whole(remembered, json.dumps(versions, indent=1).encode())
+    return version
+
+
+def _file_identity(word: str) -> list[str | int]:
+    found = shutil.which(word)
+    if found is None:
+        return [word]
+    real = Path(found).resolve()
+    status = real.stat()
+    return [str(real), status.st_size, status.st_mtime_ns]
+
+
+def _read_json_object(path: Path) -> dict[str, str]:
+    try:
+        value = json.loads(path.read_text())
+    except (OSError, ValueError):
+        return {}
+    return value if isinstance(value, dict) else {}
+
+
+def processor_name() -> str:
+    """The processor as its maker calls it, for the provenance of a run."""
+    for line in _cpuinfo_lines():
+        key, _, value = line.partition(":")
+        if key.strip() in {"model name", "Model"} and value.strip():
+            return value.strip()
+    return platform.processor() or platform.machine()
+
+
+def _processor_identity() -> str:
+    """What `-march=native` depends on: the processor's model and its instruction sets."""
+    telling = {
+        "vendor_id", "cpu family", "model", "model name", "stepping", "flags",
+        "Features", "CPU implementer", "CPU architecture", "CPU variant", "CPU part",
+    }  # fmt: skip
+    kept = [line for line in _cpuinfo_lines() if line.partition(":")[0].strip() in telling]
+    return "\n".join([platform.machine(), platform.processor(), *kept])
+
+
+def _cpuinfo_lines() -> list[str]:
+    """The first processor's block of /proc/cpuinfo; empty where there is no such file."""
+    try:
+        with Path("/proc/cpuinfo").open(encoding="utf-8", errors="replace") as file:
+            block: list[str] = []
+            for line in file:
+                if not line.strip():
+                    break
+                block.append(line.strip())
+            return block
+    except OSError:
+        return []
+
+
+def headers_digest(includes: Iterable[Path]) -> str:
+    """SHA-256 over the names and contents of every header below the given folders."""
+    digest = hashlib.sha256()
+    for folder in includes:
+        headers = (p for p in folder.rglob("*") if p.suffix in _HEADER_SUFFIXES and p.is_file())
+        for path in sorted(headers):
+            content = path.read_bytes()
+            digest.update(f"{path.relative_to(folder).as_posix()}\0{len(content)}\0".encode())
+            digest.update(content)
+    return digest.hexdigest()
+
+
+def compile_scene(
+    source: str,
+    *,
+    includes: Sequence[Path] | None = None,
+    cache: Path | None = None,
+    on_compile: Callable[[], None] = lambda: None,
+) -> CompiledScene:
+    """Compile the C++ text of a scene to a shared library, or find it compiled already.
+
+    `on_compile` is called before the compiler starts, and not where it need not.
+
+    Raises ToolError (exit 4) when there is no compiler or when it rejects the text; the message
+    then holds its first errors and the path of the source, which is kept.
+    """
+    includes = default_includes() if includes is None else tuple(includes)
+    cache = default_cache() if cache is None else cache
+    compiler = find_compiler(cache)
+    flags = flags_for(platform.machine())
+    key = hashlib.sha256(
+        json.dumps(
+            [
+                source,
+                headers_digest(includes),
+                compiler.command,
+                compiler.version,
+                flags,
+                _processor_identity(),
+            ]
+        ).encode()
+    ).hexdigest()
+    folder = cache / key
+    library, kept_source = folder / "scene.so", folder / "scene.cpp"
+    cached = library.is_file()
+    compile_s = 0.0
+    if not cached:
+        folder.mkdir(parents=True, exist_ok=True)
+        _write_whole(kept_source, source.encode())
+        on_compile()
+        started = time.perf_counter()
+        _run_compiler(compiler, flags, includes, kept_source, library)
+        compile_s = time.perf_counter() - started
+    return CompiledScene(
+        library=library,
+        source=kept_source,
+        compiler=compiler.version,
+        flags=flags,
+        processor=processor_name(),
+        compile_s=compile_s,
+        cached=cached,
+    )
+
+
+def _run_compiler(
+    compiler: Compiler,
+    flags: Sequence[str],
+    includes: Sequence[Path],
+    source: Path,
+    library: Path,
+) -> None:
+    unfinished = library.with_name(f".scene-{os.getpid()}.so")
+    command = [*compiler.command, *flags]
+    for folder in includes:
+        command += ["-I", str(folder)]
+    command += ["-o", str(unfinished), str(source)]
+    try:
+        answer = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False
+        )
+        if answer.returncode != 0:
+            raise ToolError(
+                f"{compiler.command[0]} rejected the compiled scene:\n"
+                f"{_first_errors(answer.stderr)}\n"
+                f"The source is kept in {source}\n"
+                f"The command was: {shlex.join(command)}"
+            )
+        unfinished.replace(library)
+    except OSError as problem:
+        raise ToolError(f"could not run {compiler.command[0]}: {problem}") from problem
+    finally:
+        unfinished.unlink(missing_ok=True)
+
+
+def _first_errors(output: str) -> str:
+    lines = output.strip().splitlines()
+    errors = [line for line in lines if "error" in line.lower()]
+    return "\n".join("  " + line for line in (errors or lines or ["no message"])[:_ERRORS_SHOWN])
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Write so that a reader sees the whole file or none of it."""
+    unfinished = path.with_name(f".{path.name}-{os.getpid()}")
+    unfinished.write_bytes(content)
+    unfinished.replace(path)

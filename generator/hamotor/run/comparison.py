@@ -1,0 +1,118 @@
+"""Two runs side by side: how far apart they are, in the units of the quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.errors import UsageError
+from hamotor.run.attitude import angle_between
+from hamotor.run.result import Run
+
+_SAME_TIME = 1e-9
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far apart two runs are in one quantity: at the last common time, and at most."""
+
+    body: str
+    quantity: str
+    unit: str
+    at_end: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The differences of two runs over the times both recorded."""
+
+    times: int
+    last_time: float
+    differences: tuple[Difference, ...]
+
+    @property
+    def largest(self) -> float:
+        """The largest number in the table, whatever its unit; NaN counts as infinite."""
+        values = [difference.largest for difference in self.differences]
+        return max((np.inf if np.isnan(v) else v for v in values), default=0.0)
+
+
+def compare(one: Run, other: Run) -> Comparison:
+    """Attitude (rad), position (m), momenta (their units) per body, and energy (J).
+
+    Compared at the times that both runs recorded.  Raises UsageError when the runs do not hold the
+    same bodies in the same space, or share no time.
+    """
+    if set(one.bodies) != set(other.bodies):
+        raise UsageError(
+            f"the runs hold different bodies: {', '.join(one.bodies)} and "
+            f"{', '.join(other.bodies)}."
+        )
+    here, there = _common_times(one.t, other.t)
+    if not len(here) or (one.t[here[-1]] == 0 and max(one.t[-1], other.t[-1]) > 0):
+        raise UsageError(
+            "the runs share no recorded time after the start; "
+            "run both with the same step and every."
+        )
+    differences = [
+        Difference(body, quantity, unit, float(distance[-1]), float(distance.max()))
+        for body, quantity, unit, distance in _distances(one, here, other, there)
+    ]
+    return Comparison(len(here), float(one.t[here[-1]]), tuple(differences))
+
+
+def _common_times(
+    one: NDArray[np.float64], other: NDArray[np.float64]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Indices of the times that are equal but for rounding."""
+    grid = _SAME_TIME * max(float(one[-1]), float(other[-1]), np.finfo(float).tiny)
+    nearest = np.clip(np.searchsorted(other, one), 1, max(len(other) - 1, 1))
+    nearest = np.minimum(nearest, len(other) - 1)
+    before = np.maximum(nearest - 1, 0)
+    nearest = np.where(np.abs(other[before] - one) < np.abs(other[nearest] - one), before, nearest)
+    here = np.flatnonzero(np.abs(other[nearest] - one) <= grid)
+    return here, nearest[here]
+
+
+def _distances(
+    one: Run, here: NDArray[np.intp], other: Run, there: NDArray[np.intp]
+) -> Iterator[tuple[str, str, str, NDArray[np.float64]]]:
+    for body in one.bodies:
+        attitudes = one.rotation(body)[here], other.rotation(body)[there]
+        places = one.position(body)[here], other.position(body)[there]
+        if attitudes[0].shape != attitudes[1].shape or places[0].shape != places[1].shape:
+            raise UsageError(f'body "{body}" moves in spaces of different dimension.')
+        yield body, "attitude", "rad", angle_between(*attitudes)
+        yield body, "position", "m", np.linalg.norm(places[0] - places[1], axis=-1)
+        for unit, names in _momenta_by_unit(one, other, body).items():
+            kind = "angular momentum" if "m^2" in unit else "linear momentum"
+            change = [one.trajectory[n][here] - other.trajectory[n][there] for n in names]
+            yield body, kind, unit, np.linalg.norm(np.stack(change, -1), axis=-1)
+    energies = one.energy[here] - other.energy[there]
+    yield "", "energy", one.units["energy"], np.abs(energies)
+
+
+def _momenta_by_unit(one: Run, other: Run, body: str) -> dict[str, list[str]]:
+    groups: dict[str, list[str]] = {}
+    for name in one.final[body]["momentum"]:
+        column = f"{body}.momentum.{name}"
+        if column in other.trajectory:
+            groups.setdefault(one.units[column], []).append(column)
+    return groups
+
+
+def table(comparison: Comparison) -> str:
+    """The comparison as text, one line a quantity."""
+    rows = [("body", "quantity", "at the end", "at most", "unit")]
+    rows += [
+        (d.body, d.quantity, f"{d.at_end:.3g}", f"{d.largest:.3g}", d.unit)
+        for d in comparison.differences
+    ]
+    widths = [max(len(row[k]) for row in rows) for k in range(5)]
+    lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows]
+    lines.append(f"over {comparison.times:,} common times to t = {comparison.last_time:.6g} s")
+    return "\n".join(line.rstrip() for line in lines)

@@ -1,0 +1,266 @@
+"""The compiled scene seen from Python: its C ABI, version 1, bound with ctypes.
+
+ARCHITECTURE.md states the ABI.  All numbers cross as double; states and rows are contiguous
+float64 arrays.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.errors import ToolError, UsageError, suggest
+
+ABI_VERSION = 1
+
+Vector = NDArray[np.float64]
+Rows = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column of the trajectory.  `unit` is "1" for a pure number; `body` "" for the scene."""
+
+    name: str
+    unit: str
+    frame: str
+    body: str
+
+
+@dataclass(frozen=True)
+class Conserved:
+    """A quantity that must stay constant.
+
+    Its relative error is taken over the Euclidean norm of the columns in `norm` at the start, or
+    over `scale` where there are none; a scale of 0 says that the quantity has none.
+    """
+
+    name: str
+    column: str
+    norm: tuple[str, ...] = ()
+    scale: float = 0.0
+    description: str = ""
+
+
+@dataclass(frozen=True)
+class Description:
+    """What `hamotor_describe` says about a compiled scene."""
+
+    scene: str
+    algebra: str
+    group: str
+    scalar: str
+    kernels: str
+    compiler: str
+    fma: bool
+    bodies: tuple[str, ...]
+    methods: Mapping[str, int]
+    motor: tuple[str, ...]
+    momentum: tuple[str, ...]
+    columns: tuple[Column, ...]
+    conserved: tuple[Conserved, ...]
+
+    @cached_property
+    def column_index(self) -> dict[str, int]:
+        """Where each column stands in a row."""
+        return {column.name: index for index, column in enumerate(self.columns)}
+
+    @property
+    def state_size(self) -> int:
+        """Numbers in a state: per body the motor's components, then the momentum's."""
+        return len(self.bodies) * (len(self.motor) + len(self.momentum))
+
+    def state_columns(self) -> list[int]:
+        """The columns that together are the state, in the state's order."""
+        index = self.column_index
+        return [
+            index[f"{body}.{part}.{name}"]
+            for body in self.bodies
+            for part, names in (("motor", self.motor), ("momentum", self.momentum))
+            for name in names
+        ]
+
+    def position_columns(self, body: str) -> list[int]:
+        """The columns of a body's position: x, y and, in space, z."""
+        return self._present(f"{body}.position.{axis}" for axis in "xyz")
+
+    def _present(self, names: Any) -> list[int]:
+        index = self.column_index
+        return [index[name] for name in names if name in index]
+
+
+def describe(text: str) -> Description:
+    """Read the JSON of `hamotor_describe`.  Raises ToolError when it is not what ABI 1 promises."""
+    try:
+        said = json.loads(text)
+        if said["abi"] != ABI_VERSION:
+            raise ToolError(
+                f"the compiled scene speaks version {said['abi']} of the C ABI, "
+                f"this hamotor version {ABI_VERSION}. Build both from the same checkout."
+            )
+        columns = tuple(
+            Column(c["name"], c.get("unit", "1"), c.get("frame", ""), c.get("body", ""))
+            for c in said["columns"]
+        )
+        description = Description(
+            scene=said["scene"],
+            algebra=said["algebra"],
+            group=said["group"],
+            scalar=said["scalar"],
+            kernels=said["kernels"],
+            compiler=said["compiler"],
+            fma=bool(said["fma"]),
+            bodies=tuple(said["bodies"]),
+            methods={m["name"]: int(m["order"]) for m in said["methods"]},
+            motor=tuple(said["motor"]),
+            momentum=tuple(said["momentum"]),
+            columns=columns,
+            conserved=tuple(
+                Conserved(
+                    name=c["name"],
+                    column=c["column"],
+                    norm=tuple(c.get("norm", ())),
+                    scale=float(c.get("scale", 0.0)),
+                    description=c.get("description", ""),
+                )
+                for c in said["conserved"]
+            ),
+        )
+        description.state_columns()
+        for quantity in description.conserved:
+            for name in (quantity.column, *quantity.norm):
+                description.column_index[name]
+    except (ValueError, KeyError, TypeError) as problem:
+        raise ToolError(f"the compiled scene describes itself wrongly: {problem!r}") from problem
+    return description
+
+
+class SceneLibrary:
+    """A loaded scene.  `description` says what it holds; `start` begins a run.
+
+    Raises ToolError when the file cannot be loaded or does not speak this ABI.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        try:
+            self._c = ctypes.CDLL(str(path.resolve()))
+            self._bind()
+        except OSError as problem:
+            raise ToolError(f"cannot load the compiled scene: {problem}") from problem
+        except AttributeError as problem:
+            raise ToolError(
+                f"{path} is not a compiled scene: {problem}. Delete it and run again."
+            ) from problem
+        said = self._c.hamotor_describe()
+        self.description = describe(said.decode("utf-8") if said else "")
+
+    def _bind(self) -> None:
+        numbers = ctypes.POINTER(ctypes.c_double)
+        run = ctypes.c_void_p
+        whole = ctypes.c_int64
+        number = ctypes.c_double
+        signatures: dict[str, tuple[Any, list[Any]]] = {
+            "hamotor_describe": (ctypes.c_char_p, []),
+            "hamotor_start": (run, [ctypes.c_char_p, number, number, numbers]),
+            "hamotor_advance": (whole, [run, whole, whole, numbers]),
+            "hamotor_observe": (None, [run, numbers]),
+            "hamotor_state": (None, [run, numbers]),
+            "hamotor_drift": (None, [run, numbers]),
+            "hamotor_stop": (None, [run]),
+        }
+        for name, (result, arguments) in signatures.items():
+            function = getattr(self._c, name)
+            function.restype, function.argtypes = result, arguments
+
+    def start(self, method: str, *, step: float, state: Sequence[float] | Vector) -> LiveRun:
+        """Begin a run at t = 0.
+
+        `state`: shape (state_size,), per body the motor (body to world) and the momentum in the
+        body frame, physical units.  `step` in seconds.  Raises UsageError for an unknown method.
+        """
+        initial = np.ascontiguousarray(state, dtype=np.float64)
+        if initial.shape != (self.description.state_size,):
+            raise ToolError(
+                f"the initial state has shape {initial.shape}; "
+                f"the compiled scene wants ({self.description.state_size},)"
+            )
+        check_method(method, self.description.methods)
+        handle = self._c.hamotor_start(method.encode(), 0.0, step, _pointer(initial))
+        if not handle:
+            raise ToolError(f'the compiled scene would not start method "{method}"')
+        return LiveRun(self._c, handle, self.description)
+
+
+def check_method(method: str, methods: Mapping[str, int]) -> None:
+    """Raise UsageError unless the scene offers this method."""
+    if method not in methods:
+        allowed = ", ".join(sorted(methods))
+        raise UsageError(
+            f'unknown method "{method}"; this scene offers {allowed}.{suggest(method, methods)}'
+        )
+
+
+class LiveRun:
+    """A run inside the library: advance it, look at it, stop it.  A context manager."""
+
+    def __init__(self, c: ctypes.CDLL, handle: int, description: Description) -> None:
+        self._c, self._handle, self.description = c, handle, description
+
+    def __enter__(self) -> LiveRun:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def advance(self, steps: int, every: int, rows: Rows | None) -> int:
+        """Take up to `steps` steps and return how many were taken.
+
+        After each step whose index since the start is a multiple of `every`, one row is written
+        into `rows`, shape (≥ rows due, columns), C-contiguous float64; None records nothing.
+        Fewer steps than asked for means that a number became non-finite.
+        """
+        target = None if rows is None else _pointer(rows)
+        return int(self._c.hamotor_advance(self._handle, steps, every, target))
+
+    def observe(self) -> Vector:
+        """One row of the trajectory for the state now, shape (columns,)."""
+        row = np.empty(len(self.description.columns))
+        self._c.hamotor_observe(self._handle, _pointer(row))
+        return row
+
+    def state(self) -> Vector:
+        """The state now, shape (state_size,)."""
+        state = np.empty(self.description.state_size)
+        self._c.hamotor_state(self._handle, _pointer(state))
+        return state
+
+    def drift(self) -> tuple[float, float]:
+        """|M M̃ − 1| before renormalisation: the largest left by one step, and the run's sum."""
+        drift = np.zeros(2)
+        self._c.hamotor_drift(self._handle, _pointer(drift))
+        return float(drift[0]), float(drift[1])
+
+    def stop(self) -> None:
+        """Free the run.  Harmless when called twice."""
+        if self._handle:
+            self._c.hamotor_stop(self._handle)
+            self._handle = 0
+
+
+def _pointer(array: Rows) -> Any:
+    return array.ctypes.data_as(ctypes.POINTER(ctypes.c_double))

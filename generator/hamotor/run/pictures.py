@@ -1,0 +1,323 @@
+"""Two pictures of a run: where the bodies went, and how well what is constant stayed so.
+
+Colours are Okabe and Ito's, which colour-blind readers can tell apart.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.run.attitude import rotation_matrices
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Table = Mapping[str, Array]
+
+_BLUE, _VERMILLION, _GREEN = "#0072B2", "#D55E00", "#009E73"
+_PURPLE, _ORANGE, _SKY, _BLACK = "#CC79A7", "#E69F00", "#56B4E9", "#222222"
+_AXIS_COLOURS = (_VERMILLION, _GREEN, _BLUE)
+_BODY_COLOURS = (_BLACK, _PURPLE, _ORANGE, _SKY, _GREEN, _BLUE, _VERMILLION)
+_LINE_COLOURS = (_BLUE, _VERMILLION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK)
+_GREY = "#8a8a8a"
+
+_DPI = 150
+_TRIADS = 12
+_SPHERES_DRAWN = 3
+_COARSE_TURN = 0.35  # radians between rows: a line would cut through the sphere, dots do not lie
+_FLOOR = 1e-17
+_EPSILON = float(np.finfo(float).eps)
+
+
+def draw(report: Mapping[str, Any], table: Table, swings: Table) -> dict[str, Figure]:
+    """Both pictures, by file name.
+
+    `table`: recorded rows, column → (n,); `swings`: the largest |value − initial| around each of
+    them.
+    """
+    return {
+        "path.png": draw_path(report, table),
+        "conserved.png": draw_conserved(report, table["t"], swings),
+    }
+
+
+def save(figures: Mapping[str, Figure], folder: Path) -> None:
+    """Write the pictures into a folder, each as a whole or not at all."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in figures.items():
+        unfinished = folder / f".{os.getpid()}-{name}"
+        figure.savefig(unfinished, dpi=_DPI, format="png")
+        unfinished.replace(folder / name)
+
+
+def draw_path(report: Mapping[str, Any], table: Table) -> Figure:
+    """Paths of the bodies that move from their place, attitudes of all of them."""
+    bodies = list(report["final"])
+    planar = f"{bodies[0]}.position.z" not in table and (
+        "e23" not in report["final"][bodies[0]]["motor"]
+    )
+    return _draw_planar(report, table) if planar else _draw_spatial(report, table)
+
+
+def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
+    bodies = list(report["final"])
+    moving = [body for body in bodies if _extent(_position(body, table)) > 0]
+    spheres = bodies[:_SPHERES_DRAWN]
+    panels = len(spheres) + (1 if moving else 0)
+    figure = _new_figure(5.6 * panels if panels > 1 else 6.6, 6.4, layout=None)
+    figure.subplots_adjust(left=0.03, right=0.95, bottom=0.11, top=0.83, wspace=0.12)
+    _title(figure, report)
+    at = 1
+    if moving:
+        axes: Any = figure.add_subplot(1, panels, at, projection="3d")
+        _draw_paths(axes, report, table, moving)
+        at += 1
+    for body in spheres:
+        axes = figure.add_subplot(1, panels, at, projection="3d")
+        _draw_sphere(axes, body, _rotation(body, report, table))
+        at += 1
+    _legend(figure, moving if len(moving) > 1 else [])
+    return figure
+
+
+def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequence[str]) -> None:
+    paths = {body: _position(body, table) for body in moving}
+    everything = np.concatenate(list(paths.values()))
+    length = 0.1 * _extent(everything)
+    for number, (body, path) in enumerate(paths.items()):
+        colour = _body_colour(number)
+        axes.plot(*path.T, color=colour, linewidth=1.1, alpha=0.85)
+        axes.scatter(*path[:1].T, color=colour, marker="o", s=30, depthshade=False)
+        axes.scatter(*path[-1:].T, color=colour, marker="s", s=30, depthshade=False)
+        rotation = _rotation(body, report, table)
+        for row in _evenly(path):
+            for axis, axis_colour in enumerate(_AXIS_COLOURS):
+                tip = path[row] + length * rotation[row, :, axis]
+                axes.plot(*np.stack([path[row], tip]).T, color=axis_colour, linewidth=1.2)
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    middle = (low + high) / 2
+    half = np.maximum((high - low) / 2, 0.12 * float((high - low).max())) + length
+    axes.set(
+        xlim=(middle[0] - half[0], middle[0] + half[0]),
+        ylim=(middle[1] - half[1], middle[1] + half[1]),
+        zlim=(middle[2] - half[2], middle[2] + half[2]),
+        xlabel="x (m)",
+        ylabel="y (m)",
+        zlabel="z (m)",
+    )
+    axes.set_title("path of the body frame's origin\nand the body axes on the way", fontsize=10)
+    axes.set_box_aspect(half / half.max(), zoom=0.88)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(_few_ticks())
+    axes.tick_params(labelsize=8)
+
+
+def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
+    turns = np.linspace(0, 2 * np.pi, 97)
+    for level in np.radians([-60, -30, 0, 30, 60]):
+        ring = np.stack([np.cos(turns), np.sin(turns), 0 * turns]) * np.cos(level)
+        ring[2] = np.sin(level)
+        axes.plot(*ring, color=_GREY, linewidth=0.4, alpha=0.6)
+    for meridian in np.radians(range(0, 180, 30)):
+        ring = np.stack(
+            [np.cos(turns) * np.cos(meridian), np.cos(turns) * np.sin(meridian), np.sin(turns)]
+        )
+        axes.plot(*ring, color=_GREY, linewidth=0.4, alpha=0.6)
+    for axis, colour in enumerate(_AXIS_COLOURS):
+        tips = rotation[:, :, axis]
+        if _is_coarse(tips):
+            axes.plot(*tips.T, ".", color=colour, markersize=1.2, alpha=0.5)
+        else:
+            axes.plot(*tips.T, color=colour, linewidth=0.9, alpha=0.8)
+        axes.plot(*np.stack([0 * tips[-1], tips[-1]]).T, color=colour, linewidth=2.2)
+        axes.scatter(*tips[:1].T, color=colour, marker="o", s=30, depthshade=False)
+        axes.scatter(*tips[-1:].T, color=colour, marker="s", s=30, depthshade=False)
+    axes.set(
+        xlim=(-1, 1),
+        ylim=(-1, 1),
+        zlim=(-1, 1),
+        xticks=(-1, 0, 1),
+        yticks=(-1, 0, 1),
+        zticks=(-1, 0, 1),
+        xlabel="world e1",
+        ylabel="world e2",
+        zlabel="world e3",
+    )
+    axes.set_title(f"attitude of {body}\ntraces of its axes on the unit sphere", fontsize=10)
+    axes.set_box_aspect((1, 1, 1), zoom=0.9)
+    axes.tick_params(labelsize=8)
+
+
+def _legend(figure: Figure, bodies: Sequence[str], axes: int = 3) -> None:
+    from matplotlib.lines import Line2D
+
+    entries = [
+        (Line2D([], [], color=_body_colour(number), linewidth=1.5), body)
+        for number, body in enumerate(bodies)
+    ]
+    entries += [
+        (Line2D([], [], color=colour, linewidth=2.5), f"body axis {k}")
+        for k, colour in enumerate(_AXIS_COLOURS[:axes], start=1)
+    ]
+    for marker, label in (("o", "start"), ("s", "end")):
+        entries.append((Line2D([], [], color=_BLACK, marker=marker, linestyle="none"), label))
+    figure.legend(
+        [handle for handle, _ in entries],
+        [label for _, label in entries],
+        loc="outside lower center" if figure.get_layout_engine() else "lower center",
+        ncols=min(len(entries), 8),
+        frameon=False,
+        fontsize=9,
+    )
+
+
+def _body_colour(number: int) -> str:
+    return _BODY_COLOURS[number % len(_BODY_COLOURS)]
+
+
+def _draw_planar(report: Mapping[str, Any], table: Table) -> Figure:
+    figure = _new_figure(11, 5.2)
+    _title(figure, report)
+    place: Axes = figure.add_subplot(1, 2, 1)
+    turn: Axes = figure.add_subplot(1, 2, 2)
+    bodies = list(report["final"])
+    extent = _extent(np.concatenate([_position(body, table) for body in bodies]))
+    for number, body in enumerate(bodies):
+        colour = _body_colour(number)
+        path = _position(body, table)
+        rotation = _rotation(body, report, table)
+        place.plot(*path.T, color=colour, linewidth=1.2)
+        place.plot(*path[0], "o", color=colour, markersize=6)
+        place.plot(*path[-1], "s", color=colour, markersize=6)
+        for row in _evenly(path):
+            for axis, axis_colour in enumerate(_AXIS_COLOURS[:2]):
+                tip = path[row] + 0.08 * (extent or 1.0) * rotation[row, :, axis]
+                place.plot(*np.stack([path[row], tip]).T, color=axis_colour, linewidth=1.4)
+        angle = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
+        turn.plot(table["t"], angle, color=colour, linewidth=1.2)
+    place.set(
+        xlabel="x (m)",
+        ylabel="y (m)",
+        title="path of the body frame's origin\nand the body axes on the way",
+    )
+    place.set_aspect("equal", adjustable="datalim")
+    turn.set(xlabel="time (s)", ylabel="angle (rad)", title="attitude")
+    for axes in (place, turn):
+        axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.title.set_fontsize(10)
+    _legend(figure, bodies if len(bodies) > 1 else [], axes=2)
+    return figure
+
+
+def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure:
+    """Error of every conserved quantity against time, on a logarithmic axis.
+
+    A quantity that started at zero has no relative error: its absolute one is drawn dashed.
+    """
+    figure = _new_figure(9, 5.8)
+    _title(figure, report, "what must stay constant")
+    axes: Axes = figure.add_subplot(1, 1, 1)
+    smallest, largest = _EPSILON, _EPSILON
+    for number, (name, said) in enumerate(report["conserved"].items()):
+        scale = said["scale"] or 1.0
+        error = swings[said["column"]] / scale
+        colour = _LINE_COLOURS[number % len(_LINE_COLOURS)]
+        style = "-" if said["scale"] else "--"
+        label = name if said["scale"] else f"{name} (absolute, {said['unit']})"
+        if not error.any():
+            axes.plot([], [], style, color=colour, label=f"{label}: exactly 0")
+            continue
+        axes.plot(
+            t, np.maximum(error, _FLOOR), style, color=colour, linewidth=1.1, alpha=0.9, label=label
+        )
+        positive = error[error > 0]
+        smallest, largest = min(smallest, positive.min()), max(largest, positive.max())
+    axes.axhline(_EPSILON, color=_GREY, linewidth=0.9, linestyle=":")
+    axes.annotate(
+        "rounding of a double",
+        (1, _EPSILON),
+        xycoords=("axes fraction", "data"),
+        xytext=(-3, 3),
+        textcoords="offset points",
+        ha="right",
+        fontsize=8,
+        color=_GREY,
+    )
+    axes.set_yscale("log")
+    bottom = max(_FLOOR, 10.0 ** np.floor(np.log10(smallest)))
+    axes.set_ylim(bottom, 10.0 ** (np.ceil(np.log10(largest)) + 0.3))
+    axes.set_xlim(float(t[0]), float(t[-1]) if t[-1] > t[0] else float(t[0]) + 1)
+    axes.set(
+        xlabel="time (s)",
+        ylabel="relative error |Q(t) − Q(0)| / |Q(0)|",
+    )
+    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    figure.legend(
+        loc="outside lower center",
+        ncols=3 if len(report["conserved"]) > 4 else 2,
+        frameon=False,
+        fontsize=8.5,
+    )
+    return figure
+
+
+def _new_figure(
+    width: float, height: float, layout: Literal["constrained"] | None = "constrained"
+) -> Figure:
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), layout=layout, facecolor="white")
+
+
+def _title(figure: Figure, report: Mapping[str, Any], what: str = "") -> None:
+    how = (
+        f"{report['method']}, step {report['step']:.4g} s, {report['group']} in {report['algebra']}"
+    )
+    figure.suptitle(
+        f"{report['scene']}{': ' if what else ''}{what}\n{how}", fontsize=11, fontweight="bold"
+    )
+
+
+def _few_ticks() -> Any:
+    from matplotlib.ticker import MaxNLocator
+
+    return MaxNLocator(4)
+
+
+def _position(body: str, table: Table) -> Array:
+    names = [f"{body}.position.{axis}" for axis in "xyz"]
+    return np.stack([table[name] for name in names if name in table], axis=-1)
+
+
+def _rotation(body: str, report: Mapping[str, Any], table: Table) -> Array:
+    blades = report["final"][body]["motor"]
+    return rotation_matrices({blade: table[f"{body}.motor.{blade}"] for blade in blades})
+
+
+def _extent(points: Array) -> float:
+    """The longest side of the box around the points; 0 where it is only rounding."""
+    if not len(points):
+        return 0.0
+    side = float(np.ptp(points, axis=0).max())
+    return side if side > 1e-9 * max(1.0, float(np.abs(points).max())) else 0.0
+
+
+def _evenly(path: Array) -> list[int]:
+    """Rows at which to draw the body's axes: evenly spread over the recorded times."""
+    return sorted(set(np.linspace(0, len(path) - 1, min(_TRIADS, len(path))).round().astype(int)))
+
+
+def _is_coarse(tips: Array) -> bool:
+    if len(tips) < 3:
+        return True
+    return float(np.median(np.linalg.norm(np.diff(tips, axis=0), axis=1))) > _COARSE_TURN

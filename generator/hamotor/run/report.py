@@ -1,0 +1,265 @@
+"""`run.json`, the account of a run, and the summary a person reads.
+
+Numbers of the result carry 17 significant digits, so that reading them gives the same double.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hamotor.run.attitude import rotation_matrices
+from hamotor.run.build import CompiledScene
+from hamotor.run.library import Description, Vector
+from hamotor.run.runner import Outcome
+
+_EXACT = {"final", "conserved"}
+
+Report = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a run comes from: what the report says of the scene and of how it was made."""
+
+    scene: str
+    spec_hash: str
+    version: str
+    method_reason: str
+    generate_s: float
+    representation: str = "ga"
+
+
+def report(
+    origin: Origin, compiled: CompiledScene, description: Description, outcome: Outcome
+) -> Report:
+    """The content of `run.json`.
+
+    `final` per body: `motor` (body to world), `momentum` (body frame), `position` (world, of the
+    body frame's origin, m), `rotation` (v_world = R v_body) and `scale`.
+    """
+    plan = outcome.plan
+    said: Report = {
+        "scene": origin.scene,
+        "algebra": description.algebra,
+        "group": description.group,
+        "method": plan.method,
+        "method_reason": origin.method_reason,
+        "order": description.methods[plan.method],
+        "step": plan.step,
+        "asked_step": plan.asked_step,
+        "steps": outcome.steps_done,
+        "planned_steps": plan.steps,
+        "every": plan.every,
+        "rows": outcome.rows,
+        "t_end": float(outcome.final[0]),
+        "scalar": description.scalar,
+        "kernels": description.kernels,
+        "representation": origin.representation,
+        "status": outcome.status,
+        "problem": outcome.problem,
+        "final": {
+            body: final_state(body, description, outcome.final) for body in description.bodies
+        },
+        "conserved": {
+            quantity.name: {
+                "initial": error.initial,
+                "final": error.final,
+                "max_relative_error": error.worst,
+                "scale": error.scale,
+                "unit": description.columns[description.column_index[quantity.column]].unit,
+                "column": quantity.column,
+                "description": quantity.description,
+            }
+            for quantity in description.conserved
+            for error in (outcome.conserved[quantity.name],)
+        },
+        "drift": {"largest_step": outcome.largest_drift, "sum": outcome.total_drift},
+    }
+    if outcome.ladder is not None:
+        ladder = outcome.ladder
+        said["tolerance"] = {
+            "target": ladder.target,
+            "achieved": ladder.achieved,
+            "ladder": [
+                {
+                    "step": rung.step,
+                    "steps": rung.steps,
+                    "difference": rung.difference,
+                    "status": rung.status,
+                }
+                for rung in ladder.rungs
+            ],
+        }
+    said["timing"] = {
+        "generate_s": origin.generate_s,
+        "compile_s": compiled.compile_s,
+        "compile_cached": compiled.cached,
+        "integrate_s": outcome.integrate_s,
+        "ns_per_step": outcome.ns_per_step,
+    }
+    said["provenance"] = {
+        "version": origin.version,
+        "spec": origin.spec_hash,
+        "compiler": compiled.compiler,
+        "flags": list(compiled.flags),
+        "processor": compiled.processor,
+        "fma": description.fma,
+    }
+    return said
+
+
+def final_state(body: str, description: Description, row: Vector) -> dict[str, Any]:
+    """The state of one body in a row of the trajectory, as `run.json` tells it."""
+    index = description.column_index
+    motor = {blade: float(row[index[f"{body}.motor.{blade}"]]) for blade in description.motor}
+    rotation = rotation_matrices({blade: np.array([value]) for blade, value in motor.items()})[0]
+    return {
+        "motor": motor,
+        "momentum": {
+            name: float(row[index[f"{body}.momentum.{name}"]]) for name in description.momentum
+        },
+        "position": [float(row[k]) for k in description.position_columns(body)],
+        "rotation": rotation.tolist(),
+        "scale": 1,
+    }
+
+
+def to_json(said: Mapping[str, Any]) -> str:
+    """One JSON document, indented; numbers that are not finite become null."""
+    return _value(said, 0, exact=False) + "\n"
+
+
+def _value(value: Any, depth: int, *, exact: bool) -> str:
+    if isinstance(value, Mapping):
+        return _object(value, depth, exact=exact)
+    if isinstance(value, list | tuple):
+        return _array(value, depth, exact=exact)
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            return "null"
+        return _seventeen_digits(value) if exact else json.dumps(value)
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _object(value: Mapping[str, Any], depth: int, *, exact: bool) -> str:
+    if not value:
+        return "{}"
+    inner = " " * (2 * depth + 2)
+    members = ",\n".join(
+        f"{inner}{json.dumps(name, ensure_ascii=False)}: "
+        + _value(member, depth + 1, exact=exact or name in _EXACT)
+        for name, member in value.items()
+    )
+    return f"{{\n{members}\n{' ' * (2 * depth)}}}"
+
+
+def _array(value: list[Any] | tuple[Any, ...], depth: int, *, exact: bool) -> str:
+    if all(isinstance(item, str | int | float) for item in value):
+        return "[" + ", ".join(_value(item, depth, exact=exact) for item in value) + "]"
+    inner = " " * (2 * depth + 2)
+    items = ",\n".join(inner + _value(item, depth + 1, exact=exact) for item in value)
+    return f"[\n{items}\n{' ' * (2 * depth)}]"
+
+
+def _seventeen_digits(value: float) -> str:
+    text = format(value, ".17g")
+    return text if any(mark in text for mark in ".en") else text + ".0"
+
+
+def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
+    """What happened, for a person: a dozen lines."""
+    timing = said["timing"]
+    lines = [
+        _what(said),
+        f"  {_steps(said)} in {_seconds(timing['integrate_s'])}, {_rate(timing)}",
+        f"  {_made(timing)}",
+    ]
+    if said["method_reason"]:
+        lines.append(f"  {said['method']} because {said['method_reason']}")
+    if said["step"] < said["asked_step"] * (1 - 1e-9):
+        lines.append(
+            f"  the step was shortened from {said['asked_step']:g} s so that a whole number of "
+            "steps ends at the end time"
+        )
+    if "tolerance" in said:
+        lines.append(f"  {_tolerance(said['tolerance'])}")
+    if said["status"] != "finished":
+        lines.append(
+            f"  {said['status']} after {said['steps']:,} of {said['planned_steps']:,} steps"
+        )
+    lines += ["", "  worst relative error of what must stay constant"]
+    lines += _conserved_lines(said["conserved"])
+    drift = said["drift"]
+    lines += [
+        "",
+        "  |M M̃ − 1| before renormalisation",
+        f"    {drift['largest_step']:.2g} at most in a step, {drift['sum']:.2g} summed over all",
+    ]
+    if folder is not None:
+        lines += ["", *_file_lines(folder, said)]
+    return "\n".join(lines)
+
+
+def _what(said: Mapping[str, Any]) -> str:
+    return (
+        f"{said['scene']} · {said['group']} in {said['algebra']} · {said['method']} "
+        f"(order {said['order']}) · {said['scalar']}, {said['kernels']} kernels"
+    )
+
+
+def _steps(said: Mapping[str, Any]) -> str:
+    steps = said["steps"]
+    plural = "" if steps == 1 else "s"
+    return f"{steps:,} step{plural} of {said['step']:.6g} s to t = {said['t_end']:.6g} s"
+
+
+def _rate(timing: Mapping[str, Any]) -> str:
+    return f"{timing['ns_per_step']:.4g} ns/step"
+
+
+def _made(timing: Mapping[str, Any]) -> str:
+    if timing["compile_cached"]:
+        return "compiled before, found in the cache"
+    return f"compiled in {_seconds(timing['compile_s'])}"
+
+
+def _tolerance(said: Mapping[str, Any]) -> str:
+    runs = len(said["ladder"])
+    achieved = "nothing to compare" if said["achieved"] is None else f"{said['achieved']:.2g}"
+    return f"tolerance {said['target']:g}: the last two of {runs} runs differ by {achieved}"
+
+
+def _conserved_lines(conserved: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    if not conserved:
+        return ["    nothing is conserved in this scene"]
+    width = max(len(name) for name in conserved)
+    lines = []
+    for name, said in conserved.items():
+        worst = said["max_relative_error"]
+        note = "" if said["scale"] else f"  {said['unit']}, absolute: zero at the start"
+        lines.append(f"    {name.ljust(width)}  {worst:.2g}{note}")
+    return lines
+
+
+def _file_lines(folder: Path, said: Mapping[str, Any]) -> list[str]:
+    files = ["run.json", f"trajectory/ ({said['rows']:,} rows)"]
+    files += [
+        name for name in ("trajectory.csv", "path.png", "conserved.png") if (folder / name).exists()
+    ]
+    return [f"  {folder}/", f"    {', '.join(files)}"]
+
+
+def _seconds(seconds: float) -> str:
+    if seconds >= 100:
+        return f"{seconds:.0f} s"
+    for unit, size in (("s", 1.0), ("ms", 1e-3), ("µs", 1e-6)):
+        if seconds >= size:
+            return f"{seconds / size:.3g} {unit}"
+    return f"{seconds * 1e9:.0f} ns"

@@ -1,0 +1,241 @@
+"""A scene ready to run: its C++ text, its initial state, and the defaults of its time table."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hamotor.errors import UsageError
+from hamotor.run.build import CompiledScene, compile_scene
+from hamotor.run.dataset import DiskRecorder, MemoryRecorder, RunFolder
+from hamotor.run.library import Description, SceneLibrary, Vector, check_method
+from hamotor.run.progress import NoProgress, PrintedProgress, Progress
+from hamotor.run.report import Origin, report, to_json
+from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
+from hamotor.run.runner import Outcome, Recorder, integrate, meet_tolerance, plan
+
+if TYPE_CHECKING:
+    from hamotor.scene import Scene
+
+SCALARS = ("double", "float", "long_double")
+KERNELS = ("generated",)
+
+_AUTO_METHOD = "splitting2"
+_AUTO_REASON = (
+    "it keeps every coadjoint orbit exactly and its energy error does not grow over long runs"
+)
+_FALLBACK_METHOD = "rkmk4"
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A scene that can be run.  `hamotor.load` makes one.
+
+    `source` gives the scene's C++ text for (kernels, scalar); `state` is the initial state, per
+    body motor and momentum, in the scene's body frame.  Times are in seconds.  `methods`, if given,
+    are all that a scene may ask for.
+    """
+
+    name: str
+    source: Callable[[str, str], str]
+    state: Vector
+    end: float
+    step: float | None
+    tolerance: float | None
+    method: str
+    every: int
+    spec_hash: str
+    methods: tuple[str, ...] = ()
+    scene: Scene | None = None
+
+    def compile(
+        self,
+        *,
+        scalar: str = "double",
+        kernels: str = "generated",
+        progress: Progress | None = None,
+    ) -> Compiled:
+        """The scene's shared library, compiled or found in the cache, and loaded.
+
+        Raises UsageError for an unknown scalar or kernels, ToolError when compilation fails.
+        """
+        for name, value, allowed in (("scalar", scalar, SCALARS), ("kernels", kernels, KERNELS)):
+            if value not in allowed:
+                raise UsageError(f'unknown {name} "{value}"; there is {", ".join(allowed)}.')
+        started = time.perf_counter()
+        source = self.source(kernels, scalar)
+        generate_s = time.perf_counter() - started
+        shown = NoProgress() if progress is None else progress
+        build = compile_scene(source, on_compile=lambda: shown.note(f"compiling {self.name} …"))
+        return Compiled(build, SceneLibrary(build.library), generate_s)
+
+    def run(
+        self,
+        *,
+        end: float | None = None,
+        step: float | None = None,
+        tolerance: float | None = None,
+        method: str | None = None,
+        every: int | None = None,
+        scalar: str = "double",
+        kernels: str = "generated",
+        out: str | os.PathLike[str] | None = None,
+        csv: bool = False,
+        pictures: bool = True,
+        progress: bool | Progress = False,
+    ) -> Run:
+        """Integrate from t = 0 to `end` (s) and return the run; what is not given, the scene says.
+
+        `step` (s) is shortened if need be so that a whole number of steps ends at `end`.
+        `tolerance` instead asks for a step so short that halving it changes the final state by no
+        more: the largest change of a motor's component, and of a momentum's relative to its initial
+        norm.  Every `every`-th step is recorded, and always the first and the last state.
+
+        With `out` the rows stream to that folder, which then holds `run.json`, `trajectory/`,
+        pictures and, with `csv`, `trajectory.csv`; without it nothing is written.
+
+        Raises UsageError, ToolError; RunFailed when a number became non-finite or the tolerance was
+        not met; RunInterrupted after Ctrl-C.  The last two carry in `.run` what was computed, which
+        by then is also on disk.
+        """
+        if step is not None and tolerance is not None:
+            raise UsageError("give a step or a tolerance, not both.")
+        if csv and out is None:
+            raise UsageError("csv needs out: the folder to write trajectory.csv into.")
+        if self.methods:
+            # Before the compiler runs: a slip of the pen should not take seconds to come back.
+            check_method(method or self.method, dict.fromkeys(self.methods, 0))
+        folder = None if out is None else RunFolder(out)
+        shown = _progress(progress)
+        compiled = self.compile(scalar=scalar, kernels=kernels, progress=shown)
+        description = compiled.library.description
+        method, reason = choose_method(method or self.method, description.methods)
+        end = self.end if end is None else end
+        if step is None and tolerance is None:
+            step, tolerance = self.step, self.tolerance
+
+        def new_recorder() -> Recorder:
+            if folder is None:
+                return MemoryRecorder()
+            return folder.new_recorder(description, csv=csv)
+
+        try:
+            recorder: Recorder
+            if step is not None:
+                planned = plan(method, end=end, step=step, every=every or self.every)
+                recorder = new_recorder()
+                outcome = integrate(compiled.library, self.state, planned, recorder, progress=shown)
+            elif tolerance is not None:
+                outcome, recorder = meet_tolerance(
+                    compiled.library,
+                    self.state,
+                    method=method,
+                    end=end,
+                    tolerance=tolerance,
+                    every=every or (self.every if self.every > 1 else None),
+                    new_recorder=new_recorder,
+                    progress=shown,
+                )
+            else:
+                raise UsageError("the scene has neither step nor tolerance; give one of them.")
+            run = self._result(compiled, reason, outcome, recorder, folder)
+        except BaseException:
+            if folder is not None:
+                folder.abandon()
+            raise
+        if run.folder is not None and pictures:
+            run.plot(run.folder)
+        if outcome.status == "interrupted":
+            raise RunInterrupted(run)
+        if outcome.status == "failed":
+            raise RunFailed(f"{self.name}: {outcome.problem}", run)
+        return run
+
+    def _result(
+        self,
+        compiled: Compiled,
+        reason: str,
+        outcome: Outcome,
+        recorder: Recorder,
+        folder: RunFolder | None,
+    ) -> Run:
+        from hamotor import __version__
+
+        description = compiled.library.description
+        origin = Origin(
+            scene=self.name,
+            spec_hash=self.spec_hash,
+            version=__version__,
+            method_reason=reason,
+            generate_s=compiled.generate_s,
+        )
+        said = report(origin, compiled.build, description, outcome)
+        units = units_of(description)
+        if isinstance(recorder, DiskRecorder):
+            assert folder is not None
+            folder.publish(recorder, to_json(said))
+            return Run(said, folder=folder.path, units=units)
+        assert isinstance(recorder, MemoryRecorder)
+        return Run(said, trajectory=recorder.columns(description), units=units)
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """A scene's library with what it cost: `generate_s` seconds to write its C++ text."""
+
+    build: CompiledScene
+    library: SceneLibrary
+    generate_s: float
+
+    @property
+    def description(self) -> Description:
+        """What the library holds."""
+        return self.library.description
+
+
+def choose_method(asked: str, methods: Mapping[str, int]) -> tuple[str, str]:
+    """The method to use, and why if the choice was ours (`auto`).  UsageError if unknown."""
+    if asked != "auto":
+        check_method(asked, {**methods, "auto": 0})
+        return asked, ""
+    if _AUTO_METHOD in methods:
+        return _AUTO_METHOD, _AUTO_REASON
+    if _FALLBACK_METHOD in methods:
+        return _FALLBACK_METHOD, f"this scene has no {_AUTO_METHOD}"
+    only = next(iter(methods))
+    return only, "it is what this scene offers"
+
+
+def load(scene: str | os.PathLike[str]) -> Simulation:
+    """A bundled scene by name, or a scene file by path.
+
+    Raises UsageError for an unknown name or a mistake in the file, naming file and key.
+    """
+    from hamotor.scene import METHODS, read_scene, scene_source
+
+    read = read_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
+    return Simulation(
+        name=read.name,
+        source=lambda kernels, scalar: scene_source(read, kernels=kernels, scalar=scalar),
+        state=np.asarray(read.initial_state, dtype=np.float64),
+        end=read.time.end,
+        step=read.time.step,
+        tolerance=read.time.tolerance,
+        method=read.time.method,
+        every=read.output.every,
+        spec_hash=read.sha256,
+        methods=METHODS,
+        scene=read,
+    )
+
+
+def _progress(wanted: bool | Progress) -> Progress:
+    if isinstance(wanted, bool):
+        return PrintedProgress() if wanted else NoProgress()
+    return wanted
