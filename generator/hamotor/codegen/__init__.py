@@ -7,9 +7,10 @@ from pathlib import Path
 
 from hamotor.codegen import tree
 from hamotor.codegen.compiler import SourceFile, compile_algebra
+from hamotor.codegen.show import show, table
 from hamotor.codegen.spec import AlgebraSpec, bundled_algebras, bundled_path, read_algebra
 
-__all__ = ["bundled_algebras", "generate", "read_algebra", "source_files"]
+__all__ = ["bundled_algebras", "generate", "read_algebra", "show", "source_files", "table"]
 
 
 def source_files(specs: Sequence[AlgebraSpec]) -> tuple[SourceFile, ...]:
