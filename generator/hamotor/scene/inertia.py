@@ -158,29 +158,30 @@ def momentum(
     return tuple(angular) if velocity is None else (*angular, *linear)
 
 
-def mistake_in_tensor(tensor: Matrix) -> str:
-    """What makes this (symmetric) tensor about the centre of mass unphysical, or "".
+def negative_moments(tensor: Matrix) -> str:
+    """The principal moments of a symmetric tensor, listed, if one of them is negative, or ""."""
+    moments = principal_moments(tensor)
+    largest = max(abs(x) for x in moments)
+    return _listed(moments) if moments[0] < -RELATIVE_ZERO * largest else ""
 
-    The principal moments must not be negative, and none may exceed the sum of the other two.
-    Equality is physical: a flat body has J3 = J1 + J2, and a rod has J1 = J2, J3 = 0.
+
+def violated_inequality(tensor: Matrix) -> str:
+    """The triangle inequality that this tensor about the centre of mass violates, or "".
+
+    No principal moment of a distribution of mass exceeds the sum of the other two. Equality is
+    physical: a flat body has J3 = J1 + J2, and a rod has J1 = J2, J3 = 0.
     """
     if len(tensor) == 1:
-        return "" if tensor[0][0] >= 0 else f"the moment of inertia {tensor[0][0]:.6g} is negative"
-    smallest, middle, largest = moments = [float(x) for x in np.linalg.eigvalsh(np.array(tensor))]
-    if any(x != 0.0 for row in tensor for x in row) and smallest < -RELATIVE_ZERO * max(
-        abs(x) for x in moments
-    ):
-        return (
-            f"the tensor is not positive definite: its principal moments are {_listed(moments)},"
-            " and none may be negative"
-        )
-    if largest > (smallest + middle) * (1 + RELATIVE_EQUALITY):
-        return (
-            f"the principal moments {_listed(moments)} violate the triangle inequality"
-            f" {largest:.6g} <= {max(smallest, 0.0):.6g} + {middle:.6g}:"
-            " no distribution of mass has them"
-        )
-    return ""
+        return ""
+    smallest, middle, largest = principal_moments(tensor)
+    if largest <= (smallest + middle) * (1 + RELATIVE_EQUALITY):
+        return ""
+    return f"{largest:.6g} <= {smallest:.6g} + {middle:.6g}"
+
+
+def principal_moments(tensor: Matrix) -> list[float]:
+    """The eigenvalues of a symmetric tensor, ascending."""
+    return [float(x) for x in np.linalg.eigvalsh(np.array(tensor))]
 
 
 def vanishing_axis(kinetic: NDArray[np.float64]) -> Vector | None:

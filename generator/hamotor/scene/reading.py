@@ -33,6 +33,7 @@ BUNDLED = Path(__file__).resolve().parents[2] / "scenes"
 UNIT_TOLERANCE = 1e-6
 """How far a quaternion's norm or a matrix's R Rᵀ may be from 1: seven written digits suffice."""
 MOST_KEY_PARTS = 16
+MOST_SHOWN = 200
 
 
 def bundled_scenes() -> list[tuple[str, str]]:
@@ -47,21 +48,21 @@ def read_scene(scene: str | os.PathLike[str]) -> Scene:
     for anything unreadable, larger than 1 MiB, not UTF-8, not TOML, or wrong.
     """
     shown = os.fspath(scene)
-    path = Path(shown)
+    path, missing = Path(shown), "there is no such file"
     if isinstance(scene, str) and re.fullmatch(schema.NAME_PATTERN, scene):
         bundled = sorted(file.stem for file in BUNDLED.glob("*.toml"))
         if scene in bundled:
             path, shown = BUNDLED / f"{scene}.toml", f"{scene}.toml"
-        elif not path.exists():
-            raise UsageError(
-                f"{quoted(scene)} is neither a bundled scene nor a file; bundled scenes are"
+        else:
+            missing = (
+                "is neither a bundled scene nor a file; bundled scenes are"
                 f" {listed(bundled)}.{suggest(scene, bundled)}"
             )
-    shown = shown if shown.isprintable() else quoted(shown)
-    return parse_scene(_contents(path, shown), name=path.stem, file=shown)
+    shown = shown if shown.isprintable() and len(shown) < MOST_SHOWN else quoted(shown)
+    return parse_scene(_contents(path, shown, missing), name=path.stem, file=shown)
 
 
-def _contents(path: Path, shown: str) -> bytes:
+def _contents(path: Path, shown: str, missing: str) -> bytes:
     """The bytes of a regular file of at most 1 MiB. Opening never blocks."""
 
     def refuse(why: str) -> NoReturn:
@@ -69,23 +70,22 @@ def _contents(path: Path, shown: str) -> bytes:
 
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        try:
+            status = os.fstat(descriptor)
+            if stat.S_ISDIR(status.st_mode):
+                refuse("is a directory; give the scene's TOML file in it")
+            if not stat.S_ISREG(status.st_mode):
+                refuse("is not a regular file; a scene is a TOML file")
+            too_large = status.st_size > schema.MOST_BYTES
+            with os.fdopen(descriptor, "rb", closefd=False) as file:
+                contents = b"" if too_large else file.read(schema.MOST_BYTES + 1)
+        finally:
+            os.close(descriptor)
     except FileNotFoundError:
-        refuse("there is no such file")
+        refuse(missing)
     except (OSError, ValueError) as error:
         refuse(f"cannot be read: {getattr(error, 'strerror', None) or error}")
-    with os.fdopen(descriptor, "rb") as file:
-        status = os.fstat(descriptor)
-        if stat.S_ISDIR(status.st_mode):
-            refuse("is a directory; give the scene's TOML file in it")
-        if not stat.S_ISREG(status.st_mode):
-            refuse("is not a regular file; a scene is a TOML file")
-        try:
-            contents = (
-                file.read(schema.MOST_BYTES + 1) if (status.st_size <= schema.MOST_BYTES) else None
-            )
-        except OSError as error:
-            refuse(f"cannot be read: {error.strerror}")
-    if contents is None or len(contents) > schema.MOST_BYTES:
+    if too_large or len(contents) > schema.MOST_BYTES:
         refuse(f"is larger than the {schema.MOST_BYTES >> 20} MiB that a scene may have")
     return contents
 
@@ -219,8 +219,16 @@ def _mass_distribution(table: Table) -> tuple[float, Vector, Matrix]:
     else:
         mass, center = table.number("mass"), table.vector("center_of_mass")
         tensor = _tensor(table, source, mass)
-    if mistake := inertia.mistake_in_tensor(tensor):
-        table.fail(mistake, source)
+    if moments := inertia.negative_moments(tensor):
+        table.fail(f"must be positive definite, but its principal moments are {moments}", source)
+    if not table.flag("allow_unphysical_inertia") and (
+        inequality := inertia.violated_inequality(tensor)
+    ):
+        table.fail(
+            f"the principal moments violate the triangle inequality {inequality}: no distribution"
+            " of mass has them; if they are meant, write allow_unphysical_inertia = true",
+            source,
+        )
     kinetic = inertia.kinetic_matrix(mass, center, tensor, translates=table.group.translates)
     about = tensor if table.group.translates else kinetic
     if (axis := inertia.vanishing_axis(np.array(about))) is not None:

@@ -32,8 +32,8 @@ class Key:
 
     name: str
     kind: str
-    """What the reader checks: `number`, `positive`, `non-negative`, `integer`, `text`, `name`,
-    `one of`, `vector`, `rotation` (a vector, in the plane a number), `lengths`, `moments`,
+    """What the reader checks: `number`, `positive`, `non-negative`, `integer`, `flag`, `text`,
+    `name`, `one of`, `vector`, `rotation` (a vector, in the plane a number), `lengths`, `moments`,
     `quaternion`, `matrix`, `table`, `tables`."""
     doc: str
     unit: str = ""
@@ -141,7 +141,16 @@ BODY = Section(
             "tables",
             "instead of mass, inertia and center_of_mass: point masses, kg, at points of the body"
             " frame, m",
-            example="[{ mass = 1.0, at = [0.1, 0.0, 0.0] }, { mass = 2.0, at = [0.0, 0.2, 0.3] }]",
+            example="[{mass = 2, at = [1, 0, 0]}, {mass = 1, at = [0, 1, 0]},"
+            " {mass = 1, at = [0, 0, 1]}]",
+            active=False,
+        ),
+        Key(
+            "allow_unphysical_inertia",
+            "flag",
+            "whether the moments may violate the triangle inequality, as no distribution of mass"
+            " does; the equations of motion hold for every positive definite tensor",
+            default="false",
             active=False,
         ),
         Key("center_of_mass", "vector", "in the body frame", unit="m", default="0"),

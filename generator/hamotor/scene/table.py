@@ -112,7 +112,7 @@ class Table:
     def _number(self, value: object, name: str) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
             self.fail(f"must be a number, not {kind_of(value)}", name)
-        if not math.isfinite(value):
+        if isinstance(value, float) and not math.isfinite(value):
             self.fail(f"must be finite, not {value!r}", name)
         if abs(value) > LARGEST:
             self.fail(f"must lie within ±{LARGEST:g}, so that nothing overflows", name)
@@ -138,6 +138,13 @@ class Table:
             self.fail(f"must be an integer, not {kind_of(value)}", name)
         if not 1 <= value <= 10**18:
             self.fail(f"must be at least 1 and at most 10^18, not {kind_of(value)}", name)
+        return value
+
+    def flag(self, name: str) -> bool:
+        """true or false."""
+        value = self._value(name)
+        if not isinstance(value, bool):
+            self.fail(f"must be true or false, not {kind_of(value)}", name)
         return value
 
     def numbers(self, name: str, length: int, what: str) -> Vector:
