@@ -125,7 +125,7 @@ def _demands_on_motions(scene: Scene) -> list[Row]:
 
 def _demands_on_rotations(scene: Scene) -> list[Row]:
     """The linear conditions on ω where every body has a fixed point."""
-    bodies = {body.name: body for body in scene.bodies}
+    bodies = scene.body_of
     rows: list[Row] = []
     for interaction in scene.interactions:
         if isinstance(interaction, Gravity):

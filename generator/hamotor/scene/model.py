@@ -155,19 +155,17 @@ class Scene:
         """The springs, in the scene's order."""
         return tuple(i for i in self.interactions if isinstance(i, Spring))
 
-    def body(self, name: str) -> Body:
-        """The body called `name` (KeyError if there is none)."""
-        for body in self.bodies:
-            if body.name == name:
-                return body
-        raise KeyError(name)
+    @cached_property
+    def body_of(self) -> dict[str, Body]:
+        """The bodies by name."""
+        return {body.name: body for body in self.bodies}
 
     def spring_vector(self, spring: Spring) -> NDArray[np.float64]:
         """From a spring's far end to its point on `spring.body` at the start, world frame, m."""
-        near = self.body(spring.body).in_world(spring.at)
+        near = self.body_of[spring.body].in_world(spring.at)
         if spring.other is None:
             return np.asarray(near - np.array(spring.anchor))
-        return near - self.body(spring.other).in_world(spring.other_at or ())
+        return near - self.body_of[spring.other].in_world(spring.other_at or ())
 
     @cached_property
     def initial_energy(self) -> tuple[float, float, float]:

@@ -170,11 +170,14 @@ def _bodies(top: Table, most: int) -> tuple[Body, ...]:
             f" allow more with [limits] bodies = {len(tables)}"
         )
     bodies: list[Body] = []
+    first: dict[str, int] = {}
     for number, values in enumerate(tables, 1):
         body = _body(Table(top.file, f"body {number}", values, schema.BODY, top.group))
-        if any(body.name == other.name for other in bodies):
-            first = next(k for k, other in enumerate(bodies, 1) if other.name == body.name)
-            top.fail(f'body {number}: name: "{body.name}" is the name of body {first} already')
+        if body.name in first:
+            top.fail(
+                f'body {number}: name: "{body.name}" is the name of body {first[body.name]} already'
+            )
+        first[body.name] = number
         bodies.append(body)
     return tuple(bodies)
 
@@ -379,7 +382,7 @@ def _refuse_singular_springs(top: Table, scene: Scene) -> None:
     for number, spring in enumerate(scene.interactions, 1):
         if not isinstance(spring, Spring) or spring.rest_length == 0:
             continue
-        near = scene.body(spring.body)
+        near = scene.body_of[spring.body]
         sizes = [*near.position, *spring.at, *(spring.anchor or ()), *(spring.other_at or ())]
         size = max(spring.rest_length, *map(abs, sizes))
         if float(np.linalg.norm(scene.spring_vector(spring))) <= 1e-12 * size:
