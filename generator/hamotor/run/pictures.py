@@ -262,12 +262,13 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
     )
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
-    figure.legend(
-        loc="outside lower center",
-        ncols=3 if len(report["conserved"]) > 4 else 2,
-        frameon=False,
-        fontsize=8.5,
-    )
+    if report["conserved"]:
+        figure.legend(
+            loc="outside lower center",
+            ncols=3 if len(report["conserved"]) > 4 else 2,
+            frameon=False,
+            fontsize=8.5,
+        )
     return figure
 
 

@@ -1,0 +1,42 @@
+"""A simulation small enough to check by hand: see toy_scene.cpp."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hamotor.run.simulation import Simulation
+
+SOURCE = Path(__file__).with_name("toy_scene.cpp").read_text(encoding="utf-8")
+RATE = 2.0
+
+
+def toy_source(**switches: int | str) -> str:
+    """The toy's C++ text with some of its switches set: FAIL_AT, OVERFLOW_AT, SLEEP_US, ABI."""
+    return "".join(f"#define {name} {value}\n" for name, value in switches.items()) + SOURCE
+
+
+def toy_state() -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    """At x = 1 m, at rest there, spinning about e3 at 2 rad/s: x(t) = cos t, angle 2 t."""
+    state = np.zeros(14)
+    state[0], state[4], state[10] = 1.0, -0.5, RATE
+    return state
+
+
+def toy(switches: dict[str, int | str] | None = None, **changes: Any) -> Simulation:
+    """The toy as a simulation of 10 s in steps of 0.01 s, or as `changes` say."""
+    source = toy_source(**(switches or {}))
+    settings: dict[str, Any] = {
+        "name": "toy",
+        "source": lambda _kernels, _scalar: source,
+        "state": toy_state(),
+        "end": 10.0,
+        "step": 0.01,
+        "tolerance": None,
+        "method": "auto",
+        "every": 1,
+        "spec_hash": "0123abcd",
+    }
+    return Simulation(**{**settings, **changes})
