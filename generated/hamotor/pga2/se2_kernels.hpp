@@ -126,28 +126,34 @@ template <class S>
 
 /// cayley: Rate -> Motor
 /// (1 + B)(1 − B)⁻¹.
-/// Cost: 11 mul, 2 add (2 fused), 1 div.
+/// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
+/// Cost: 9 mul, 2 add, 1 div.
 template <class S>
 [[nodiscard]] constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
-  const S s = w.w12 * w.w12;
-  const S inverse = S(1) / mul_add(S(0.25), s, S(1));
-  const S twice = S(2) * inverse;
-  return {.s = mul_add(S(0.25), -s, S(1)) * inverse,
-          .e12 = S(0.5) * (-twice * w.w12),
-          .e01 = S(0.5) * (-twice * w.v1),
-          .e02 = S(0.5) * (-twice * w.v2)};
+  const S b_e01 = S(0.5) * -w.v1;
+  const S b_e02 = S(0.5) * -w.v2;
+  const S b_e12 = S(0.5) * -w.w12;
+  const S square = b_e12 * b_e12;
+  const S rest = S(1) + square;
+  const S inverse = S(1) / rest;
+  const S linear = S(2) * inverse;
+  return {.s = (S(1) - square) * inverse,
+          .e12 = linear * b_e12,
+          .e01 = linear * b_e01,
+          .e02 = linear * b_e02};
 }
 
 /// cayley_inverse: Motor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
-/// Infinite at M = −1, which no finite B reaches.
+/// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 6 mul, 1 add, 1 div.
 template <class S>
 [[nodiscard]] constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
-  const S inverse = S(1) / (S(1) + m.s);
-  return {.w12 = S(-2) * (inverse * m.e12),
-          .v1 = S(-2) * (inverse * m.e01),
-          .v2 = S(-2) * (inverse * m.e02)};
+  const S rest = S(1) + m.s;
+  const S linear = S(1) / rest;
+  return {.w12 = S(-2) * (linear * m.e12),
+          .v1 = S(-2) * (linear * m.e01),
+          .v2 = S(-2) * (linear * m.e02)};
 }
 
 }  // namespace hamotor::pga2::se2

@@ -131,28 +131,34 @@ template <class S>
 
 /// cayley: Rate -> Rotor
 /// (1 + B)(1 − B)⁻¹.
-/// Cost: 13 mul, 4 add (4 fused), 1 div.
+/// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
+/// Cost: 11 mul, 4 add (2 fused), 1 div.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
-  const S s = mul_add(w.w23, w.w23, mul_add(w.w31, w.w31, w.w12 * w.w12));
-  const S inverse = S(1) / mul_add(S(0.25), s, S(1));
-  const S twice = S(2) * inverse;
-  return {.s = mul_add(S(0.25), -s, S(1)) * inverse,
-          .e23 = S(0.5) * (-twice * w.w23),
-          .e31 = -(S(0.5) * (twice * w.w31)),
-          .e12 = S(0.5) * (-twice * w.w12)};
+  const S b_e12 = S(0.5) * -w.w12;
+  const S b_e13 = S(0.5) * w.w31;
+  const S b_e23 = S(0.5) * -w.w23;
+  const S square = mul_add(b_e23, b_e23, mul_add(b_e13, b_e13, b_e12 * b_e12));
+  const S rest = S(1) + square;
+  const S inverse = S(1) / rest;
+  const S linear = S(2) * inverse;
+  return {.s = (S(1) - square) * inverse,
+          .e23 = linear * b_e23,
+          .e31 = -(linear * b_e13),
+          .e12 = linear * b_e12};
 }
 
 /// cayley_inverse: Rotor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
-/// Infinite at M = −1, which no finite B reaches.
+/// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 6 mul, 1 add, 1 div.
 template <class S>
 [[nodiscard]] constexpr so3::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
-  const S inverse = S(1) / (S(1) + r.s);
-  return {.w23 = S(-2) * (inverse * r.e23),
-          .w31 = S(2) * (-inverse * r.e31),
-          .w12 = S(-2) * (inverse * r.e12)};
+  const S rest = S(1) + r.s;
+  const S linear = S(1) / rest;
+  return {.w23 = S(-2) * (linear * r.e23),
+          .w31 = S(2) * (linear * -r.e31),
+          .w12 = S(-2) * (linear * r.e12)};
 }
 
 }  // namespace hamotor::pga3::so3

@@ -22,10 +22,13 @@ from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import library
+from hamotor.codegen.program import Call
 from hamotor.codegen.spec import AlgebraSpec
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
+RUNTIME_HEADERS = {"bivector_exponential": "hamotor/bivector_exponential.hpp"}
+"""Functions that stand in a header of their own."""
 
 
 @dataclass(frozen=True)
@@ -188,6 +191,8 @@ def _kernels_file(
     includes: Sequence[str],
 ) -> SourceFile:
     template = "kernels.hpp.jinja"
+    needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
+    includes = [*includes, *(RUNTIME_HEADERS[f] for f in sorted(needed) if f in RUNTIME_HEADERS)]
     text = _render(
         template,
         banner=_banner(spec, template, "Kernels: unrolled, sparse, for any scalar type S."),
@@ -232,6 +237,7 @@ def _group_files(
             "dimension": len(group.generators),
             "generators": ", ".join(f'"{g.name}"' for g in group.generators),
             "table": table,
+            "functions": [k.name for k in kernels],
         },
     )
     return [

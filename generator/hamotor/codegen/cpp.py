@@ -21,13 +21,14 @@ from hamotor.codegen.program import (
 )
 
 PAIRS = {
+    "bivector_exponential",
     "compensated_dot_pair",
     "double_word_sqrt",
     "double_word_unscale",
     "double_word_ratio",
     "sin_cos",
 }
-"""Functions of the runtime that return two numbers."""
+"""Functions of the runtime that return several numbers."""
 
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 

@@ -14,6 +14,7 @@ from fractions import Fraction
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, reverse_sign
 from hamotor.codegen.element import Element
+from hamotor.codegen.nullsplit import hyperbolic_pairs, split_program
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Expression,
@@ -102,6 +103,7 @@ def proved(kernel: Kernel) -> Kernel:
 
 
 def product_kernel(
+    algebra: Algebra,
     name: str,
     law: str,
     product: Callable[[Blade, Blade], Multivector],
@@ -118,6 +120,11 @@ def product_kernel(
     kept = {m for p in meaning.values() for m in p}
     pairs = (len(kept), (len(a.element.blades)) * (len(b.element.blades)))
     program = direct_program((a, b), meaning, result)
+    for pair in hyperbolic_pairs(algebra):
+        operands = ((a, value_of(a)), (b, value_of(b)))
+        split = split_program(algebra, pair, product, operands, result, factor)
+        if split is not None and split.cost.total < program.cost.total:
+            program = split
     return proved(Kernel(name, law, program, meaning, namespace, pairs))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from fractions import Fraction
 
-from hamotor.codegen import transcendental
+from hamotor.codegen import closedform, transcendental
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, grade
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
@@ -93,7 +93,7 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
                 spec, apply_bilinear(product, value_of(a), value_of(b)), where
             )
         name = request.operation
-        return product_kernel(name, LAWS[name], product, left, right, result)
+        return product_kernel(algebra, name, LAWS[name], product, left, right, result)
     if request.operation == "sandwich":
         versor, operand = operands
         if not versor.unit or any(g % 2 for g in versor.grades):
@@ -142,15 +142,15 @@ def _unary_kernel(
             target = result or spec.element("Scalar", where)
             return quadratic_kernel(algebra, "norm_squared", "<a ~a>₀", operand, target)
         case "normalize":
-            return transcendental.normalize_kernel(algebra, operand, result or operand)
+            return closedform.normalize_kernel(algebra, operand, result or operand, where)
         case operation:
             if result is None:
                 raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
             build = {
-                "exp": transcendental.exp_kernel,
+                "exp": exp_kernel,
                 "log": transcendental.log_kernel,
-                "cayley": transcendental.cayley_kernel,
-                "cayley_inverse": transcendental.cayley_inverse_kernel,
+                "cayley": closedform.cayley_kernel,
+                "cayley_inverse": closedform.cayley_inverse_kernel,
             }[operation]
             return build(algebra, operand, result, "", where)
 
@@ -176,7 +176,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         result: Element,
         factor: Fraction = Fraction(1),
     ) -> Kernel:
-        return product_kernel(name, law, table, left, right, result, namespace, factor)
+        return product_kernel(algebra, name, law, table, left, right, result, namespace, factor)
 
     kernels = [
         product("ad", "ad_a b = [a, b] = a b − b a", bracket, rate, rate, rate),
@@ -210,13 +210,25 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         ),
         _pairing(group),
     ]
+    if algebra.dimension > closedform.MAXIMUM_DIMENSION:
+        return kernels
+    kernels.append(exp_kernel(algebra, rate, element, namespace, where))
+    if transcendental.split_bivectors(algebra, rate.blades) is not None:
+        kernels.append(transcendental.log_kernel(algebra, element, rate, namespace, where))
     kernels += [
-        transcendental.exp_kernel(algebra, rate, element, namespace, where),
-        transcendental.log_kernel(algebra, element, rate, namespace, where),
-        transcendental.cayley_kernel(algebra, rate, element, namespace, where),
-        transcendental.cayley_inverse_kernel(algebra, element, rate, namespace, where),
+        closedform.cayley_kernel(algebra, rate, element, namespace, where),
+        closedform.cayley_inverse_kernel(algebra, element, rate, namespace, where),
     ]
     return kernels
+
+
+def exp_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """exp: the form accurate for every input where there is one, else the general closed form."""
+    simple = transcendental.split_bivectors(algebra, operand.blades) is not None
+    build = transcendental.exp_kernel if simple else closedform.exp_kernel
+    return build(algebra, operand, result, namespace, where)
 
 
 def _pairing(group: LieGroup) -> Kernel:

@@ -127,6 +127,11 @@ class Cost:
             {n: self.calls.get(n, 0) + other.calls.get(n, 0) for n in names},
         )
 
+    @property
+    def total(self) -> int:
+        """Multiplications, additions and divisions together."""
+        return self.mul + self.add + self.div
+
     def __str__(self) -> str:
         """For a header: `48 mul, 40 add (40 fused)`."""
         parts = [f"{self.mul} mul", f"{self.add} add"]
@@ -168,10 +173,14 @@ class Program:
     def cost(self) -> Cost:
         """Operation count by kind."""
         total = Cost()
-        for _, expression in (*self.bindings, *self.outputs):
-            for node in walk(expression):
-                total = total + _node_cost(node)
+        for node in self.nodes():
+            total = total + _node_cost(node)
         return total
+
+    def nodes(self) -> Iterator[Expression]:
+        """Every expression in the program."""
+        for _, expression in (*self.bindings, *self.outputs):
+            yield from walk(expression)
 
     def expand(self) -> dict[str, Polynomial]:
         """The polynomials in the parameters that the outputs stand for.

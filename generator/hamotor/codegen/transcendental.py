@@ -1,4 +1,4 @@
-"""exp, log, Cayley and normalisation in closed form, for algebras whose rotation planes are simple.
+"""exp and log accurate for every input, for algebras whose rotations have one plane.
 
 Covered here: bivectors B with B² = −θ² + W, θ² a sum of squares, W of grade 4 and W² = 0: the
 projective algebras of the plane and of space and the rotations of space.  With J(B) = <B W>/(2t),
@@ -27,13 +27,11 @@ from hamotor.codegen.algebra import Algebra, Blade, grade
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import (
     Kernel,
-    Staging,
     parameters_for,
     read_off,
-    reversed_value,
     value_of,
 )
-from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
+from hamotor.codegen.polynomial import PolynomialMultivector
 from hamotor.codegen.program import (
     Call,
     Expression,
@@ -73,8 +71,8 @@ class Plane:
     along: Mapping[Blade, tuple[Blade, int]]
 
 
-def split_bivectors(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
-    """Split the bivector blades; raises UsageError where the closed forms here do not apply."""
+def split_bivectors(algebra: Algebra, blades: Sequence[Blade]) -> Plane | None:
+    """Split the bivector blades; None where the closed forms here do not apply."""
     names: PolynomialMultivector = {b: {(algebra.blade_name(b),): Fraction(1)} for b in blades}
     square = poly.apply_bilinear(algebra.geometric, names, names)
     rotation = [
@@ -101,11 +99,18 @@ def split_bivectors(algebra: Algebra, blades: Sequence[Blade], where: str) -> Pl
         simple = len(pitch) == expected and set(along) <= set(translation)
         simple = simple and not algebra.blade_product(pseudoscalar, pseudoscalar)
     if not simple:
+        return None
+    return Plane(tuple(rotation), tuple(translation), tuple(pitch), along)
+
+
+def _required_split(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
+    plane = split_bivectors(algebra, blades)
+    if plane is None:
         raise UsageError(
-            f"{where}: exp and log in closed form need bivectors with B² = −θ² + W and W² = 0; "
+            f"{where}: this closed form needs bivectors with B² = −θ² + W and W² = 0; "
             f"those of {algebra.name} are not of that kind"
         )
-    return Plane(tuple(rotation), tuple(translation), tuple(pitch), along)
+    return plane
 
 
 class Writer:
@@ -196,7 +201,7 @@ def exp_kernel(
     """exp of a bivector or rate."""
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = split_bivectors(algebra, sorted(value), where)
+    plane = _required_split(algebra, sorted(value), where)
     writer = Writer()
     b = _coefficients(writer, algebra, value, "b")
     ws_scale, ws = _scaled(writer, {u: b[u] for u in plane.rotation}, "w", algebra)
@@ -254,7 +259,7 @@ def log_kernel(
     """Principal logarithm of a unit versor: exp(log M) = M, angle θ in [0, π]."""
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = split_bivectors(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
     writer = Writer()
     m = _coefficients(writer, algebra, value, "m")
     scalar = m[0]
@@ -326,158 +331,7 @@ def log_kernel(
     return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
 
-def _named(writer: Staging, name: str, expression: Expression) -> Polynomial:
-    writer.bindings.append((name, expression))
-    return {(name,): Fraction(1)}
-
-
-def cayley_kernel(
-    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
-) -> Kernel:
-    """(1 + B)(1 − B)⁻¹ = [1 − S² + 2W + 2(1 − S)B + 2<BW>] / (1 − S)², B² = S + W, W² = 0."""
-    (parameter,) = parameters_for(operand)
-    value = value_of(parameter)
-    split_bivectors(algebra, sorted(value), where)
-    staging = Staging()
-    value = {
-        b: staging.bind(f"b_{algebra.blade_name(b)}", p)
-        if len(p) > 1 or any(abs(x) != 1 for x in p.values())
-        else p
-        for b, p in sorted(value.items())
-    }
-    square = poly.apply_bilinear(algebra.geometric, value, value)
-    s = staging.bind("s", square.get(0, {}))
-    _named(
-        staging,
-        "inverse",
-        Quotient(ONE, polynomial_expression(poly_sum({(): Fraction(1)}, s, Fraction(-1)))),
-    )
-    twice = _named(staging, "twice", Product(number(2), Name("inverse")))
-    out: dict[Blade, Expression] = {
-        0: Product(
-            polynomial_expression(poly_sum({(): Fraction(1)}, s, Fraction(1))), Name("inverse")
-        )
-    }
-    w = {b: staging.bind(f"w_{algebra.blade_name(b)}", p) for b, p in square.items() if b}
-    factor = _named(staging, "w_factor", Product(Name("twice"), Name("inverse"))) if w else {}
-    turned = poly.apply_bilinear(algebra.geometric, value, w)
-    for b, p in w.items():
-        out[b] = polynomial_expression(poly.times(factor, p))
-    for b, p in value.items():
-        first = polynomial_expression(poly.times(twice, p))
-        extra = turned.get(b)
-        out[b] = (
-            MultiplyAdd(Name("w_factor"), polynomial_expression(extra), first) if extra else first
-        )
-    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
-    return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace)
-
-
-def poly_sum(a: Polynomial, b: Polynomial, factor: Fraction) -> Polynomial:
-    """a + factor b."""
-    total = dict(a)
-    poly.add_scaled(total, b, factor)
-    return total
-
-
-def cayley_inverse_kernel(
-    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
-) -> Kernel:
-    """(M − 1)(M + 1)⁻¹ = <M>₂ (1 + s + p)⁻¹ for M ~M = 1, M = s + <M>₂ + p, p² = 0."""
-    (parameter,) = parameters_for(operand)
-    value = value_of(parameter)
-    bivector = {b: p for b, p in value.items() if grade(b) == 2}
-    split_bivectors(algebra, sorted(bivector), where)
-    quad = {b: p for b, p in value.items() if grade(b) == 4}
-    staging = Staging()
-    inverse = _named(
-        staging,
-        "inverse",
-        Quotient(ONE, polynomial_expression(poly_sum({(): Fraction(1)}, value[0], Fraction(1)))),
-    )
-    out: dict[Blade, Expression] = {}
-    turned = poly.apply_bilinear(algebra.geometric, bivector, quad)
-    if quad:
-        _named(
-            staging,
-            "slope",
-            Product(
-                polynomial_expression(poly.times(inverse, next(iter(quad.values())))),
-                Name("inverse"),
-            ),
-        )
-    for b, p in bivector.items():
-        first = polynomial_expression(poly.times(inverse, p))
-        if b in turned:
-            ((monomial, x),) = turned[b].items()
-            other = next(n for n in monomial if {(n,): Fraction(1)} not in quad.values())
-            out[b] = MultiplyAdd(Name("slope"), signed(-int(x), Name(other)), first)
-        else:
-            out[b] = first
-    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
-    return Kernel(
-        "cayley_inverse",
-        "(M − 1)(M + 1)⁻¹, M ~M = 1",
-        program,
-        None,
-        namespace,
-        None,
-        ("Infinite at M = −1, which no finite B reaches.",),
-    )
-
-
-def normalize_kernel(algebra: Algebra, operand: Element, result: Element) -> Kernel:
-    """M (~M M)^(−1/2) for an even M with ~M M = N + η I, I² = 0 (theory.md §7)."""
-    (parameter,) = parameters_for(operand)
-    value = value_of(parameter)
-    square = poly.apply_bilinear(algebra.geometric, reversed_value(value), value)
-    rest = [b for b in square if b]
-    if any(grade(b) != 4 for b in rest) or len(rest) > 1:
-        raise UsageError(
-            f"{algebra.name}: normalize {operand.name}: ~M M must be a number plus one null blade "
-            "of grade 4"
-        )
-    staging = Staging()
-    norm = staging.bind("norm2", square[0])
-    _named(staging, "factor", Quotient(ONE, call("sqrt", polynomial_expression(norm))))
-    out: dict[Blade, Expression] = {}
-    scaled = {b: poly.times({("factor",): Fraction(1)}, p) for b, p in value.items()}
-    if rest:
-        (blade,) = rest
-        eta = staging.bind("eta", square[blade])
-        ((eta_name, eta_scale),) = eta.items()
-        _named(
-            staging,
-            "slip",
-            Quotient(
-                Product(Product(number(-eta_scale / 2), Name(eta_name[0])), Name("factor")),
-                polynomial_expression(norm),
-            ),
-        )
-        turned = poly.apply_bilinear(algebra.geometric, value, {blade: {("slip",): Fraction(1)}})
-        for b, p in scaled.items():
-            first = polynomial_expression(p)
-            if b in turned:
-                ((monomial, x),) = turned[b].items()
-                other = next(n for n in monomial if n != "slip")
-                out[b] = MultiplyAdd(Name("slip"), signed(int(x), Name(other)), first)
-            else:
-                out[b] = first
-    else:
-        out = {b: polynomial_expression(p) for b, p in scaled.items()}
-    program = Program((parameter,), tuple(staging.bindings), _outputs(out, result), result)
-    return Kernel(
-        "normalize",
-        "M (~M M)^(−1/2): the unit versor nearest to M",
-        program,
-        None,
-    )
-
-
 __all__ = [
-    "cayley_inverse_kernel",
-    "cayley_kernel",
     "exp_kernel",
     "log_kernel",
-    "normalize_kernel",
 ]

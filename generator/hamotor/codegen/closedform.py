@@ -1,0 +1,315 @@
+"""exp of a general bivector, Cayley maps and normalisation, in closed form for n ≤ 5.
+
+For n ≤ 5 the square of a bivector is B² = S + W with W of grade 4 and W² = ω a number, and B, W
+commute.  Everything analytic in B is therefore a combination of 1, W, B and V = <B W>₂ whose
+coefficients depend on S and ω alone (theory.md §7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from hamotor.codegen import polynomial as poly
+from hamotor.codegen.algebra import Algebra, Blade, grade
+from hamotor.codegen.element import Element
+from hamotor.codegen.kernel import Kernel, parameters_for, read_off, reversed_value, value_of
+from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
+from hamotor.codegen.program import (
+    Call,
+    Expression,
+    MultiplyAdd,
+    Name,
+    Negative,
+    Number,
+    Parameter,
+    Product,
+    Program,
+    Quotient,
+    Sum,
+    negative,
+    number,
+    polynomial_expression,
+)
+from hamotor.errors import UsageError
+
+ONE = number(1)
+MAXIMUM_DIMENSION = 5
+
+
+class Writer:
+    """Collects bindings; what is already a name or a constant is not bound again."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.bindings: list[tuple[str, Expression]] = []
+
+    def let(self, name: str, expression: Expression) -> Expression:
+        """Bind an expression and return its name."""
+        match expression:
+            case Name() | Number() | Negative(Name()):
+                return expression
+            case _:
+                self.bindings.append((name, expression))
+                return Name(name)
+
+    def let_polynomial(self, name: str, p: Polynomial) -> Polynomial:
+        """Bind a polynomial, unless it is one factor or none; returns what stands for it."""
+        if not p or (len(p) == 1 and len(next(iter(p))) <= 1):
+            return p
+        content = poly.content(p)
+        self.bindings.append((name, polynomial_expression(poly.scaled(p, 1 / content))))
+        return {(name,): content}
+
+
+@dataclass(frozen=True)
+class Square:
+    """A square S + W of a number and a part of grade 4, over names.
+
+    number: S.  quad: W / content, where every coefficient is ± one name if that can be had.
+    omega: W².
+    """
+
+    number: Polynomial
+    quad: PolynomialMultivector
+    content: Fraction
+    omega: Polynomial
+
+
+def _square(
+    algebra: Algebra, writer: Writer, square: PolynomialMultivector, names: str, where: str
+) -> Square:
+    """Bind S, W and ω of a square; raises UsageError where it is not a number plus grade 4."""
+    quad = {
+        b: writer.let_polynomial(f"{names}_{algebra.blade_name(b)}", p)
+        for b, p in sorted(square.items())
+        if b
+    }
+    omega = poly.apply_bilinear(algebra.geometric, quad, quad)
+    if any(grade(b) != 4 for b in quad) or any(omega.keys() - {0}):
+        raise UsageError(
+            f"{where}: closed forms exist for algebras of at most 5 dimensions, where a bivector's "
+            f"square is a number plus a part of grade 4 whose own square is a number; "
+            f"{algebra.name} has {algebra.dimension}"
+        )
+    sizes = {abs(x) for p in quad.values() for x in p.values()}
+    content = sizes.pop() if len(sizes) == 1 else Fraction(1)
+    quad = {b: poly.scaled(p, 1 / content) for b, p in quad.items()}
+    number_part = writer.let_polynomial("square", square.get(0, {}))
+    return Square(number_part, quad, content, writer.let_polynomial("omega", omega.get(0, {})))
+
+
+def _times(content: Fraction, expression: Expression) -> Expression:
+    return expression if content == 1 else Product(number(content), expression)
+
+
+def _bivector(
+    algebra: Algebra, writer: Writer, parameter: Parameter, where: str
+) -> PolynomialMultivector:
+    """The bivector that a parameter stands for, over names without coefficients."""
+    value = value_of(parameter)
+    if any(grade(b) != 2 for b in value):
+        raise UsageError(f"{where}: {parameter.element.name} is not a bivector")
+    bound: PolynomialMultivector = {}
+    for blade, p in sorted(value.items()):
+        if len(p) == 1 and all(abs(x) == 1 for x in p.values()):
+            bound[blade] = p
+        else:
+            name = f"b_{algebra.blade_name(blade)}"
+            writer.bindings.append((name, polynomial_expression(p)))
+            bound[blade] = {(name,): Fraction(1)}
+    return bound
+
+
+def one_name(p: Polynomial) -> tuple[int, str]:
+    """Sign and name of a polynomial that is ± one name."""
+    ((monomial, x),) = p.items()
+    (name,) = monomial
+    return int(x), name
+
+
+def outputs_for(
+    values: Mapping[Blade, Expression], result: Element
+) -> tuple[tuple[str, Expression], ...]:
+    """The components of the result, read off blade coefficients."""
+    names: PolynomialMultivector = {b: {(f"{b}",): Fraction(1)} for b in values}
+    outputs: list[tuple[str, Expression]] = []
+    for component, p in read_off(names, result).items():
+        total: Expression | None = None
+        for monomial, x in p.items():
+            value = values[int(monomial[0])]
+            if abs(x) == 1:
+                term = value if x > 0 else negative(value)
+                total = term if total is None else Sum(total, term)
+            else:
+                scaled = number(x)
+                total = (
+                    Product(scaled, value) if total is None else MultiplyAdd(scaled, value, total)
+                )
+        outputs.append((component, total if total is not None else number(0)))
+    return tuple(outputs)
+
+
+def _combination(
+    parts: list[tuple[Expression, PolynomialMultivector]], start: Mapping[Blade, Expression]
+) -> dict[Blade, Expression]:
+    """Σ coefficient · multivector, added to `start`."""
+    out = dict(start)
+    for coefficient, value in parts:
+        for blade, p in value.items():
+            if len(p) == 1 and all(abs(x) == 1 and len(m) == 1 for m, x in p.items()):
+                sign, name = one_name(p)
+                factor: Expression = Name(name) if sign > 0 else Negative(Name(name))
+            else:
+                factor = polynomial_expression(p)
+            known = out.get(blade)
+            out[blade] = (
+                Product(coefficient, factor)
+                if known is None
+                else MultiplyAdd(coefficient, factor, known)
+            )
+    return out
+
+
+def exp_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """exp of a general bivector: any signature, degenerate or not, n ≤ 5."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    b = _bivector(algebra, writer, parameter, where)
+    parts = _square(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    twisted = {
+        blade: p
+        for blade, p in poly.apply_bilinear(algebra.geometric, b, parts.quad).items()
+        if grade(blade) == 2
+    }
+    writer.let(
+        "e",
+        Call(
+            "bivector_exponential",
+            (polynomial_expression(parts.number), polynomial_expression(parts.omega)),
+        ),
+    )
+    out: dict[Blade, Expression] = {0: Name("e.number")}
+    terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("e.bivector"), b)]
+    for name, value in (("quad", parts.quad), ("twisted", twisted)):
+        if value:
+            terms.append((writer.let(name, _times(parts.content, Name(f"e.{name}"))), value))
+    out = _combination(terms, out)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    notes = ("Any bivector: two commuting rotations or boosts, isoclinic, simple or null.",)
+    return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, notes)
+
+
+def cayley_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """(1 + B)(1 − B)⁻¹ = [1 − S² + ω + 2W + 2(1 − S)B + 2V] / D, D = (1 − S)² − ω."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    b = _bivector(algebra, writer, parameter, where)
+    parts = _square(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    one: Polynomial = {(): Fraction(1)}
+    s = polynomial_expression(parts.number)
+    left = poly.added({0: one}, {0: parts.number}, Fraction(-1))[0]
+    rest = writer.let("rest", polynomial_expression(left))
+    twisted = poly.apply_bilinear(algebra.geometric, b, parts.quad)
+    if parts.omega:
+        omega = polynomial_expression(parts.omega)
+        determinant = MultiplyAdd(rest, rest, negative(omega))
+        inverse = writer.let("inverse", Quotient(ONE, determinant))
+        even = Sum(MultiplyAdd(negative(s), s, ONE), omega)
+        twice = writer.let("twice", Product(number(2), inverse))
+        linear = writer.let("linear", Product(rest, twice))
+        twice = writer.let("even", _times(parts.content, twice))
+    else:
+        inverse = writer.let("inverse", Quotient(ONE, rest))
+        even = Sum(ONE, s)
+        linear = writer.let("linear", Product(number(2), inverse))
+        twice = linear
+        if parts.quad:
+            twice = writer.let("even", _times(parts.content, Product(linear, inverse)))
+    out = _combination(
+        [(linear, b), (twice, parts.quad), (twice, twisted)], {0: Product(even, inverse)}
+    )
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    notes = ("Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).",)
+    return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace, None, notes)
+
+
+def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
+    value = value_of(parameter)
+    if any(g % 2 for g in parameter.element.grades) or max(parameter.element.grades) > 4:
+        raise UsageError(f"{where}: {parameter.element.name} must be even, with grades 0 to 4")
+    return value
+
+
+def cayley_inverse_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """(M − 1)(M + 1)⁻¹ = <M>₂ (1 + s − Q) / ((1 + s)² − Q²), s + Q = M's grades 0 and 4."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    value = _versor(parameter, where)
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
+    omega = poly.apply_bilinear(algebra.geometric, quad, quad)
+    if any(omega.keys() - {0}):
+        raise UsageError(f"{where}: closed forms exist for at most 5 dimensions")
+    scalar = poly.added({0: {(): Fraction(1)}}, {0: value[0]})[0]
+    rest = writer.let("rest", polynomial_expression(scalar))
+    twisted = {
+        b: poly.scaled(p, Fraction(-1))
+        for b, p in poly.apply_bilinear(algebra.geometric, bivector, quad).items()
+        if grade(b) == 2
+    }
+    if omega:
+        square = negative(polynomial_expression(omega[0]))
+        inverse = writer.let("inverse", Quotient(ONE, MultiplyAdd(rest, rest, square)))
+        linear = writer.let("linear", Product(rest, inverse))
+    else:
+        linear = writer.let("linear", Quotient(ONE, rest))
+        inverse = writer.let("inverse", Product(linear, linear)) if quad else linear
+    out = _combination([(linear, bivector), (inverse, twisted)], {})
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    law = "(M − 1)(M + 1)⁻¹, M ~M = 1"
+    notes = ("Infinite at M = −1, which no finite bivector reaches.",)
+    return Kernel("cayley_inverse", law, program, None, namespace, None, notes)
+
+
+def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
+    """M (~M M)^(−1/2) with ~M M = N + Q, Q² = q: (u − Q/2u)/r, r² = N² − q, u² = (N + r)/2."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    value = _versor(parameter, where)
+    square = poly.apply_bilinear(algebra.geometric, reversed_value(value), value)
+    parts = _square(algebra, writer, square, "q", where)
+    norm = writer.let("norm2", polynomial_expression(parts.number))
+    if parts.omega:
+        omega = negative(polynomial_expression(parts.omega))
+        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
+        half = Product(number(Fraction(1, 2)), Sum(norm, radius))
+        root = writer.let("root", Call("sqrt", (half,)))
+    else:
+        radius = norm
+        root = writer.let("root", Call("sqrt", (norm,)))
+    if not parts.quad:
+        factor = writer.let("factor", Quotient(ONE, root))
+        out = _combination([(factor, value)], {})
+    else:
+        factor = writer.let("factor", Quotient(root, radius))
+        turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
+        slip = writer.let("slip", Quotient(number(-parts.content / 2), Product(root, radius)))
+        content = next(iter(parts.quad.values()))
+        if len(parts.quad) == 1 and len(content) == 1:
+            # one grade-4 blade: take it into the factor, so that each component costs one fma
+            ((monomial, x),) = content.items()
+            slip = writer.let("turn", Product(slip, polynomial_expression({monomial: x})))
+            (blade,) = parts.quad
+            turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): Fraction(1)}})
+        out = _combination([(factor, value), (slip, turned)], {})
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    law = "M (~M M)^(−1/2): the unit versor nearest to M"
+    return Kernel("normalize", law, program, None)

@@ -1,0 +1,144 @@
+"""Cheaper products for algebras with a hyperbolic pair: matrices over the rest of the algebra.
+
+Null vectors n, m with n·m = g ≠ 0, orthogonal to all other basis vectors, span a factor of 2 × 2
+matrices: with E = n ∧ m, E² = g², the idempotents P± = ½(1 ± E/g) are its diagonal units.  Written
+in A P+ and A P− instead of A and A E, half of all products vanish: conformal even × even is a
+product of 2 × 2 quaternion matrices, 128 multiplications instead of 256.  Nothing here knows that:
+the change of basis is applied to any bilinear product, and the cost decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+
+from hamotor.codegen import polynomial as poly
+from hamotor.codegen.algebra import Algebra, Blade, Multivector
+from hamotor.codegen.element import Element
+from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
+from hamotor.codegen.program import (
+    Expression,
+    Parameter,
+    Product,
+    Program,
+    number,
+    polynomial_expression,
+)
+
+
+def hyperbolic_pairs(algebra: Algebra) -> list[tuple[int, int]]:
+    """Pairs of null basis vectors that see each other and nothing else."""
+    pairs = []
+    for i in range(algebra.dimension):
+        partners = [j for j in range(algebra.dimension) if algebra.gram[i][j]]
+        if len(partners) == 1 and partners[0] > i:
+            j = partners[0]
+            if [k for k in range(algebra.dimension) if algebra.gram[j][k]] == [i]:
+                pairs.append((i, j))
+    return pairs
+
+
+def _times_pair(algebra: Algebra, pair: tuple[int, int], blade: Blade) -> tuple[Blade, Fraction]:
+    """A E/g for a blade A without the pair: a blade and its coefficient."""
+    i, j = pair
+    both = 1 << i | 1 << j
+    sign = algebra.outer(blade, both)[blade | both]
+    return blade | both, sign / algebra.gram[i][j]
+
+
+def split_program(
+    algebra: Algebra,
+    pair: tuple[int, int],
+    product: Callable[[Blade, Blade], Multivector],
+    operands: tuple[
+        tuple[Parameter, PolynomialMultivector], tuple[Parameter, PolynomialMultivector]
+    ],
+    result: Element,
+    factor: Fraction,
+) -> Program | None:
+    """The product computed in the basis A P±; None where an operand or the result forbids it."""
+    if not result.is_blades:
+        return None
+    bindings: list[tuple[str, Expression]] = []
+    values = [_split_value(algebra, pair, p.name, value, bindings) for p, value in operands]
+    turned = poly.apply_bilinear(product, *values)
+    both = 1 << pair[0] | 1 << pair[1]
+    outputs: dict[str, Expression] = {}
+    by_blade = {next(iter(c.embedding)): c for c in result.components}
+
+    def out(blade: Blade, p: Polynomial) -> None:
+        component = by_blade[blade]
+        outputs[component.name] = polynomial_expression(
+            poly.scaled(p, factor / component.embedding[blade])
+        )
+
+    for blade, half_sum in by_blade.items():
+        if blade & both == both and blade ^ both in by_blade:
+            continue
+        other, sign = (0, Fraction(0)) if blade & both else _times_pair(algebra, pair, blade)
+        if other not in by_blade or blade & both:
+            out(blade, turned.get(blade, {}))
+            continue
+        name = algebra.blade_name(blade)
+        plus, minus = dict(turned.get(blade, {})), dict(turned.get(blade, {}))
+        rest = turned.get(other, {})
+        poly.add_scaled(plus, rest, 1 / sign)
+        poly.add_scaled(minus, rest, -1 / sign)
+        halves: dict[str, Polynomial] = {}
+        for half, p in (("plus", plus), ("minus", minus)):
+            if p:
+                bindings.append((f"{half}_{name}", polynomial_expression(p)))
+                halves[half] = {(f"{half}_{name}",): Fraction(1)}
+        total: Polynomial = {}
+        difference: Polynomial = {}
+        for half, sign_of_half in (("plus", 1), ("minus", -1)):
+            poly.add_scaled(total, halves.get(half, {}), Fraction(1))
+            poly.add_scaled(difference, halves.get(half, {}), Fraction(sign_of_half))
+        half_difference = by_blade[other]
+        outputs[half_sum.name] = _halved(total, factor / half_sum.embedding[blade])
+        outputs[half_difference.name] = _halved(
+            difference, factor * sign / half_difference.embedding[other]
+        )
+    ordered = tuple((c.name, outputs[c.name]) for c in result.components)
+    return Program(tuple(p for p, _ in operands), tuple(bindings), ordered, result)
+
+
+def _halved(p: Polynomial, factor: Fraction) -> Expression:
+    if not p:
+        return number(0)
+    content = poly.content(p) * factor / 2
+    return Product(number(content), polynomial_expression(poly.scaled(p, 1 / poly.content(p))))
+
+
+def _split_value(
+    algebra: Algebra,
+    pair: tuple[int, int],
+    prefix: str,
+    value: Mapping[Blade, Polynomial],
+    bindings: list[tuple[str, Expression]],
+) -> PolynomialMultivector:
+    """The same multivector over named sums and differences of its coefficients."""
+    both = 1 << pair[0] | 1 << pair[1]
+    result: PolynomialMultivector = {}
+    for blade, p in value.items():
+        if blade & both not in (0, both):
+            result[blade] = dict(p)
+    for blade in sorted({b & ~both for b in value if b & both in (0, both)}):
+        other, sign = _times_pair(algebra, pair, blade)
+        parts: dict[int, Polynomial] = {}
+        for direction, half in ((1, "plus"), (-1, "minus")):
+            total: Polynomial = dict(value.get(blade, {}))
+            poly.add_scaled(total, value.get(other, {}), direction / sign)
+            if len(total) > 1:
+                name = f"{prefix}_{half}_{algebra.blade_name(blade)}"
+                bindings.append((name, polynomial_expression(total)))
+                total = {(name,): Fraction(1)}
+            parts[direction] = total
+        plus, minus = parts[1], parts[-1]
+        for target, sum_sign, scale in ((blade, 1, Fraction(1)), (other, -1, sign)):
+            mixed: Polynomial = {}
+            poly.add_scaled(mixed, plus, scale / 2)
+            poly.add_scaled(mixed, minus, sum_sign * scale / 2)
+            if mixed:
+                result[target] = mixed
+    return result

@@ -1,0 +1,118 @@
+// The numbers in exp B for a general bivector B of an algebra with at most five dimensions.
+#pragma once
+
+#include "hamotor/scalar.hpp"
+
+namespace hamotor::scalar {
+
+/// exp B = number + quad W + bivector B + twisted <B W>₂, where B² = S + W.
+template <class S>
+struct BivectorExponential {
+  S number;
+  S quad;
+  S bivector;
+  S twisted;
+};
+
+namespace detail {
+
+/// cosh √x: cos √−x for negative x.
+template <class S>
+[[nodiscard]] S cosh_root(const S& x) noexcept {
+  using std::cos;
+  using std::cosh;
+  return x < S(0) ? cos(sqrt(-x)) : cosh(sqrt(x));
+}
+
+/// sinh √x / √x: sin √−x / √−x for negative x, 1 at 0.
+template <class S>
+[[nodiscard]] S sinhc_root(const S& x) noexcept {
+  using std::sin;
+  using std::sinh;
+  const S root = sqrt(abs(x));
+  if (!(root > S(0))) return S(1);
+  return (x < S(0) ? sin(root) : sinh(root)) / root;
+}
+
+/// x + y W with W² = ω.
+template <class S>
+struct Ring {
+  S x;
+  S y;
+};
+
+template <class S>
+[[nodiscard]] constexpr Ring<S> times(const Ring<S>& a, const Ring<S>& b, const S& omega) noexcept {
+  return {mul_add(a.x, b.x, omega * (a.y * b.y)), mul_add(a.x, b.y, a.y * b.x)};
+}
+
+/// Terms of the two series that bring |S| + √|ω| ≤ 1 below half an ulp.
+template <class S>
+[[nodiscard]] constexpr int series_terms() noexcept {
+  // the remainder after n terms is about 1/(2n + 2)!
+  S factorial(1);
+  int n = 1;
+  for (; n < 40; ++n) {
+    factorial = factorial * S((2 * n + 1) * (2 * n + 2));
+    if (S(1) / factorial < std::numeric_limits<S>::epsilon() / S(8)) break;
+  }
+  return n;
+}
+
+/// Horner's scheme for cosh √(S + W) and sinh √(S + W) / √(S + W) in the ring of x + y W.
+template <class S>
+[[nodiscard]] constexpr BivectorExponential<S> exponential_series(const S& s,
+                                                                  const S& omega) noexcept {
+  Ring<S> even{S(1), S(0)};
+  Ring<S> odd{S(1), S(0)};
+  const Ring<S> square{s, S(1)};
+  for (int n = series_terms<S>(); n > 0; --n) {
+    const S even_scale = S(1) / S(2 * n * (2 * n - 1));
+    const S odd_scale = S(1) / S(2 * n * (2 * n + 1));
+    const Ring<S> e = times(even, square, omega);
+    const Ring<S> o = times(odd, square, omega);
+    even = {mul_add(e.x, even_scale, S(1)), e.y * even_scale};
+    odd = {mul_add(o.x, odd_scale, S(1)), o.y * odd_scale};
+  }
+  return {even.x, even.y, odd.x, odd.y};
+}
+
+}  // namespace detail
+
+/// The four numbers of exp B from S = <B²>₀ and ω = W² (theory.md §7).
+///
+/// B² has the eigenvalues λ₁, λ₂ = (S ± √(S² − ω))/2 on its two planes and, as an element of the
+/// ring of x + y W, the eigenvalues S ± √ω.  Of the two ways to interpolate, the one with separated
+/// nodes is taken: λ where ω is small or negative (one plane, null planes, a boost and a rotation),
+/// S ± √ω where the planes are nearly or exactly isoclinic or where λ is complex.  Small B go by
+/// the power series, in which neither matters.  Each form is free of cancellation.
+template <class S>
+[[nodiscard]] BivectorExponential<S> bivector_exponential(const S& s, const S& omega) noexcept {
+  const S root = sqrt(abs(omega));
+  const S half(0.5);
+  if (!(abs(s) + root > S(1))) return detail::exponential_series(s, omega);
+  if (omega > S(0.25) * (s * s)) {
+    const S high = s + root;
+    const S low = s - root;
+    const S cosh_high = detail::cosh_root(high);
+    const S cosh_low = detail::cosh_root(low);
+    const S sinh_high = detail::sinhc_root(high);
+    const S sinh_low = detail::sinhc_root(low);
+    const S share = half / root;
+    return {half * (cosh_high + cosh_low), share * (cosh_high - cosh_low),
+            half * (sinh_high + sinh_low), share * (sinh_high - sinh_low)};
+  }
+  const S gap = sqrt(mul_add(s, s, -omega));
+  const S large = half * (s < S(0) ? s - gap : s + gap);
+  const S small = S(0.25) * omega / large;
+  const S c_large = detail::cosh_root(large);
+  const S c_small = detail::cosh_root(small);
+  const S h_large = detail::sinhc_root(large);
+  const S h_small = detail::sinhc_root(small);
+  const S inverse = S(1) / (large - small);
+  return {c_large * c_small, half * (h_large * h_small),
+          inverse * mul_add(large * h_large, c_small, -(small * h_small) * c_large),
+          half * inverse * mul_add(c_large, h_small, -h_large * c_small)};
+}
+
+}  // namespace hamotor::scalar
