@@ -41,7 +41,7 @@ def account(table: Mapping[str, Array], conserved: Mapping[str, Any] | None = No
 
 
 def titles(figure: Any) -> list[str]:
-    return [axes.get_title() for axes in figure.axes]
+    return [axes.get_title().splitlines()[0] for axes in figure.axes if axes.get_title()]
 
 
 T = np.linspace(0, 6, 200)
@@ -51,7 +51,7 @@ CIRCLE = np.stack([np.cos(T), np.sin(T), 0.1 * T], -1)
 def test_a_body_that_moves_has_a_path_and_an_attitude() -> None:
     table = {"t": T, **spinning("top", T, CIRCLE)}
     figure = draw_path(account(table), table)
-    assert [title.splitlines()[0] for title in titles(figure)] == [
+    assert titles(figure) == [
         "path of the body frame's origin",
         "attitude of top",
     ]
@@ -60,9 +60,7 @@ def test_a_body_that_moves_has_a_path_and_an_attitude() -> None:
 
 def test_a_body_that_stays_in_its_place_has_an_attitude_only() -> None:
     table = {"t": T, **spinning("top", T, 0 * CIRCLE + 5.0 + 1e-16)}
-    assert [t.splitlines()[0] for t in titles(draw_path(account(table), table))] == [
-        "attitude of top"
-    ]
+    assert titles(draw_path(account(table), table)) == ["attitude of top"]
 
 
 def test_several_bodies_share_one_picture_and_are_named() -> None:
@@ -72,7 +70,15 @@ def test_several_bodies_share_one_picture_and_are_named() -> None:
     entries = [text.get_text() for text in figure.legends[0].get_texts()]
     assert "moon" in entries
     assert "mars" in entries
-    assert len(figure.axes) == 4
+    assert titles(figure)[1:] == ["attitude of sun", "attitude of moon", "attitude of mars"]
+
+
+def test_what_is_shown_in_space_is_shown_over_time_below_it() -> None:
+    table = {"t": T, **spinning("top", T, CIRCLE)}
+    below = [axes for axes in draw_path(account(table), table).axes if not axes.get_title()]
+    assert [axes.get_xlabel() for axes in below] == ["time (s)", "time (s)"]
+    turned = below[1].lines[0].get_ydata()
+    np.testing.assert_allclose(turned, np.cos(T), atol=1e-12)
 
 
 def test_a_planar_scene_is_drawn_in_the_plane() -> None:

@@ -70,22 +70,65 @@ def draw_path(report: Mapping[str, Any], table: Table) -> Figure:
 def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
     bodies = list(report["final"])
     moving = [body for body in bodies if _extent(_position(body, table)) > 0]
-    spheres = bodies[:_SPHERES_DRAWN]
-    panels = len(spheres) + (1 if moving else 0)
-    figure = _new_figure(5.6 * panels if panels > 1 else 6.6, 6.4, layout=None)
-    figure.subplots_adjust(left=0.03, right=0.95, bottom=0.11, top=0.83, wspace=0.12)
+    turning = bodies[:_SPHERES_DRAWN]
+    panels = len(turning) + (1 if moving else 0)
+    figure = _new_figure(5.2 * panels + 1.2, 8.2, layout=None)
+    # Each column shows one thing in space and, below it, over time.
+    grid = figure.add_gridspec(
+        2,
+        panels,
+        height_ratios=(2.2, 1),
+        left=0.85 / (5.2 * panels + 1.2),
+        right=1 - 0.35 / (5.2 * panels + 1.2),
+        bottom=0.125,
+        top=0.86,
+        wspace=0.22,
+        hspace=0.08,
+    )
     _title(figure, report)
-    at = 1
+    column = 0
     if moving:
-        axes: Any = figure.add_subplot(1, panels, at, projection="3d")
-        _draw_paths(axes, report, table, moving)
-        at += 1
-    for body in spheres:
-        axes = figure.add_subplot(1, panels, at, projection="3d")
-        _draw_sphere(axes, body, _rotation(body, report, table))
-        at += 1
+        space: Any = figure.add_subplot(grid[0, column], projection="3d")
+        _draw_paths(space, report, table, moving)
+        _draw_coordinates(figure.add_subplot(grid[1, column]), table, moving)
+        column += 1
+    for body in turning:
+        rotation = _rotation(body, report, table)
+        space = figure.add_subplot(grid[0, column], projection="3d")
+        _draw_sphere(space, body, rotation)
+        _draw_turning(figure.add_subplot(grid[1, column]), table["t"], rotation)
+        column += 1
     _legend(figure, moving if len(moving) > 1 else [])
     return figure
+
+
+def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
+    from matplotlib.lines import Line2D
+
+    styles: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+    for number, body in enumerate(moving):
+        for values, style in zip(_position(body, table).T, styles, strict=False):
+            axes.plot(table["t"], values, style, color=_body_colour(number), linewidth=1.0)
+    axes.set(xlabel="time (s)", ylabel="position (m)")
+    handles = [Line2D([], [], color=_BLACK, linestyle=style, linewidth=1.0) for style in styles]
+    axes.legend(handles, "xyz", loc="upper right", ncols=3, fontsize=8, framealpha=0.7)
+    _quiet_grid(axes)
+
+
+def _draw_turning(axes: Axes, t: Array, rotation: Array) -> None:
+    mark, size = (".", 1.5) if _is_coarse(rotation[:, :, 0]) else ("-", 1.0)
+    for axis, colour in enumerate(_AXIS_COLOURS):
+        cosine = rotation[:, :, axis] @ rotation[0, :, axis]
+        axes.plot(t, cosine, mark, color=colour, linewidth=1.0, markersize=size, alpha=0.85)
+    axes.set(xlabel="time (s)", ylabel="cos of the angle turned", ylim=(-1.08, 1.08))
+    _quiet_grid(axes)
+
+
+def _quiet_grid(axes: Axes) -> None:
+    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.tick_params(labelsize=8)
+    axes.margins(x=0.01)
 
 
 def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequence[str]) -> None:
@@ -114,7 +157,7 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
         zlabel="z (m)",
     )
     axes.set_title("path of the body frame's origin\nand the body axes on the way", fontsize=10)
-    axes.set_box_aspect(half / half.max(), zoom=0.88)
+    axes.set_box_aspect(half / half.max(), zoom=1.05)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(_few_ticks())
     axes.tick_params(labelsize=8)
@@ -140,20 +183,14 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
         axes.plot(*np.stack([0 * tips[-1], tips[-1]]).T, color=colour, linewidth=2.2)
         axes.scatter(*tips[:1].T, color=colour, marker="o", s=30, depthshade=False)
         axes.scatter(*tips[-1:].T, color=colour, marker="s", s=30, depthshade=False)
-    axes.set(
-        xlim=(-1, 1),
-        ylim=(-1, 1),
-        zlim=(-1, 1),
-        xticks=(-1, 0, 1),
-        yticks=(-1, 0, 1),
-        zticks=(-1, 0, 1),
-        xlabel="world e1",
-        ylabel="world e2",
-        zlabel="world e3",
-    )
+    for axis, label in enumerate(("e1", "e2", "e3")):
+        tip = 1.22 * np.eye(3)[axis]
+        axes.plot(*np.stack([tip / 1.22, tip]).T, color=_GREY, linewidth=1.0)
+        axes.text(*(1.12 * tip), label, color=_GREY, fontsize=9, ha="center", va="center")
+    axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
+    axes.set_axis_off()
     axes.set_title(f"attitude of {body}\ntraces of its axes on the unit sphere", fontsize=10)
-    axes.set_box_aspect((1, 1, 1), zoom=0.9)
-    axes.tick_params(labelsize=8)
+    axes.set_box_aspect((1, 1, 1), zoom=1.25)
 
 
 def _legend(figure: Figure, bodies: Sequence[str], axes: int = 3) -> None:
@@ -211,8 +248,7 @@ def _draw_planar(report: Mapping[str, Any], table: Table) -> Figure:
     place.set_aspect("equal", adjustable="datalim")
     turn.set(xlabel="time (s)", ylabel="angle (rad)", title="attitude")
     for axes in (place, turn):
-        axes.grid(visible=True, color="#dddddd", linewidth=0.6)
-        axes.set_axisbelow(True)
+        _quiet_grid(axes)
         axes.title.set_fontsize(10)
     _legend(figure, bodies if len(bodies) > 1 else [], axes=2)
     return figure
@@ -260,8 +296,7 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
         xlabel="time (s)",
         ylabel="relative error |Q(t) − Q(0)| / |Q(0)|",
     )
-    axes.grid(visible=True, color="#dddddd", linewidth=0.6)
-    axes.set_axisbelow(True)
+    _quiet_grid(axes)
     if report["conserved"]:
         figure.legend(
             loc="outside lower center",
