@@ -368,9 +368,9 @@ def _list(parsed: argparse.Namespace) -> int:
 
 
 def _algebras() -> list[tuple[str, str]]:
-    from hamotor.codegen import bundled_algebras
+    from hamotor.codegen.spec import bundled_algebras, bundled_path, read_algebra
 
-    return [(name, "") for name in bundled_algebras()]
+    return [(name, read_algebra(bundled_path(name)).description) for name in bundled_algebras()]
 
 
 def _scenes() -> list[tuple[str, str]]:

@@ -77,7 +77,7 @@ def test_what_is_shown_in_space_is_shown_over_time_below_it() -> None:
     table = {"t": T, **spinning("top", T, CIRCLE)}
     below = [axes for axes in draw_path(account(table), table).axes if not axes.get_title()]
     assert [axes.get_xlabel() for axes in below] == ["time (s)", "time (s)"]
-    turned = below[1].lines[0].get_ydata()
+    turned = np.asarray(below[1].lines[0].get_ydata(), dtype=np.float64)
     np.testing.assert_allclose(turned, np.cos(T), atol=1e-12)
 
 

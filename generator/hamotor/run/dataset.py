@@ -15,7 +15,7 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -225,11 +225,18 @@ def read_thinned(
 
     parts = trajectory_parts(folder)
     total = sum(pq.read_metadata(part).num_rows for part in parts)
+    return thinned(_read_parts(parts), total, most_rows)
+
+
+def thinned(
+    blocks: Iterable[Mapping[str, NDArray[np.float64]]], total: int, most_rows: int
+) -> tuple[dict[str, NDArray[np.float64]], dict[str, NDArray[np.float64]]]:
+    """The same of `total` rows that come in blocks."""
     stride = max(1, -(-total // most_rows))
     kept: list[dict[str, NDArray[np.float64]]] = []
     swings: list[dict[str, NDArray[np.float64]]] = []
     initial: dict[str, float] = {}
-    for block in _read_parts(parts):
+    for block in blocks:
         initial = initial or {name: float(values[0]) for name, values in block.items()}
         starts = np.arange(0, len(block["t"]), stride)
         # The first row stays the initial state; every other bin is represented by its last row.

@@ -93,6 +93,7 @@ def report(
                     "steps": rung.steps,
                     "difference": rung.difference,
                     "status": rung.status,
+                    "integrate_s": rung.integrate_s,
                 }
                 for rung in ladder.rungs
             ],

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hamotor.errors import NumericsError, UsageError, suggest
 from hamotor.run.attitude import rotation_matrices
-from hamotor.run.dataset import REPORT, is_run, read_thinned, read_trajectory
+from hamotor.run.dataset import REPORT, is_run, read_thinned, read_trajectory, thinned
 from hamotor.run.library import Description
 from hamotor.run.report import Report, summary
 
@@ -136,8 +136,7 @@ class Run:
     def _thinned(self) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
         if self._trajectory is None and self.folder is not None:
             return read_thinned(self.folder, _DRAWN_ROWS)
-        table = self.trajectory
-        return table, {name: np.abs(values - values[0]) for name, values in table.items()}
+        return thinned([self.trajectory], len(self.t), _DRAWN_ROWS)
 
     def _stacked(self, body: str | None, part: str) -> Array:
         body = self._body(body)

@@ -113,6 +113,7 @@ class Rung:
     steps: int
     difference: float | None
     status: Status
+    integrate_s: float
 
 
 @dataclass(frozen=True)
@@ -148,9 +149,9 @@ class Outcome:
 
 
 class Interruption:
-    """Ctrl-C and SIGTERM held back while a run steps: `asked` turns true and the run ends itself.
+    """Ctrl-C and SIGTERM held back while a run steps and is written: `asked` turns true.
 
-    A second Ctrl-C does not wait.  Outside the main thread signals are left alone.
+    The run ends itself after the chunk it is in.  Outside the main thread signals are left alone.
     """
 
     def __init__(self) -> None:
@@ -173,8 +174,6 @@ class Interruption:
             signal.signal(number, handler)  # type: ignore[arg-type]
 
     def _hold(self, _number: int, _frame: FrameType | None) -> None:
-        if self.asked:
-            raise KeyboardInterrupt
         self.asked = True
 
 
@@ -234,11 +233,7 @@ def integrate(
     number of steps.  A number that becomes non-finite ends the run with status "failed": rows up
     to then are kept.  The recorder is closed.
     """
-    if interruption is None:
-        with Interruption() as own:
-            return integrate(
-                library, state, plan, recorder, progress=progress, interruption=own, stage=stage
-            )
+    interruption = Interruption() if interruption is None else interruption
     progress = NoProgress() if progress is None else progress
     with library.start(plan.method, step=plan.step, state=state) as live:
         progress.begin(stage, plan.steps)
@@ -390,6 +385,7 @@ def meet_tolerance(
     every: int | None,
     new_recorder: Callable[[], Recorder],
     progress: Progress | None = None,
+    interruption: Interruption | None = None,
 ) -> tuple[Outcome, Recorder]:
     """Halve the step until the final states of two runs differ by at most `tolerance`.
 
@@ -400,61 +396,71 @@ def meet_tolerance(
     """
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise UsageError(f"tolerance must be a positive number, not {tolerance!r}.")
+    plan(method, end=end, step=end, every=1 if every is None else every)
     step = first_step(library, state, method=method, end=end)
     rungs: list[Rung] = []
     best: tuple[Outcome, Recorder] | None = None
     achieved: float | None = None
     reason = ""
     status: Status = "failed"
-    with Interruption() as interruption:
-        for _ in range(_MOST_HALVINGS + 1):
-            rung_plan = plan(method, end=end, step=step, every=1)
-            rung_plan = replace(
-                rung_plan, every=every or max(1, rung_plan.steps // _ROWS_OF_A_TOLERANCE_RUN)
+    interruption = Interruption() if interruption is None else interruption
+    for _ in range(_MOST_HALVINGS + 1):
+        rung_plan = plan(method, end=end, step=step, every=1)
+        rung_plan = replace(
+            rung_plan,
+            every=max(1, rung_plan.steps // _ROWS_OF_A_TOLERANCE_RUN) if every is None else every,
+        )
+        recorder = new_recorder()
+        outcome = integrate(
+            library,
+            state,
+            rung_plan,
+            recorder,
+            progress=progress,
+            interruption=interruption,
+            stage=f"step {rung_plan.step:.3g} s",
+        )
+        difference = None
+        if best is not None and best[0].status == outcome.status == "finished":
+            difference = state_difference(library.description, best[0], outcome)
+        rungs.append(
+            Rung(
+                rung_plan.step,
+                rung_plan.steps,
+                difference,
+                outcome.status,
+                outcome.integrate_s,
             )
-            recorder = new_recorder()
-            outcome = integrate(
-                library,
-                state,
-                rung_plan,
-                recorder,
-                progress=progress,
-                interruption=interruption,
-                stage=f"step {rung_plan.step:.3g} s",
+        )
+        if outcome.status == "interrupted" and best is not None:
+            # A whole run with a longer step says more than a part of the next one.
+            recorder.discard()
+            status = "interrupted"
+            break
+        if best is not None:
+            best[1].discard()
+        best = outcome, recorder
+        achieved = difference
+        if outcome.status == "interrupted":
+            status = "interrupted"
+            break
+        if difference is not None and difference <= tolerance:
+            status = "finished"
+            break
+        if _stalled(rungs):
+            reason = (
+                f"halving the step no longer brings the runs together: they still differ by "
+                f"{difference:.3g}. Rounding stands in the way; ask for more than "
+                f"{2 * min(_differences(rungs)):.2g}."
             )
-            difference = None
-            if best is not None and best[0].status == outcome.status == "finished":
-                difference = state_difference(library.description, best[0], outcome)
-            rungs.append(Rung(rung_plan.step, rung_plan.steps, difference, outcome.status))
-            if outcome.status == "interrupted" and best is not None:
-                # A whole run with a longer step says more than a part of the next one.
-                recorder.discard()
-                status = "interrupted"
-                break
-            if best is not None:
-                best[1].discard()
-            best = outcome, recorder
-            achieved = difference
-            if outcome.status == "interrupted":
-                status = "interrupted"
-                break
-            if difference is not None and difference <= tolerance:
-                status = "finished"
-                break
-            if _stalled(rungs):
-                reason = (
-                    f"halving the step no longer brings the runs together: they still differ by "
-                    f"{difference:.3g}. Rounding stands in the way; ask for more than "
-                    f"{2 * min(_differences(rungs)):.2g}."
-                )
-                break
-            # Half of the step in use, so that the steps of a rung are nested in the next one's.
-            step = rung_plan.step / 2
-            if rung_plan.steps * 2 >= _MOST_STEPS:
-                reason = "the number of steps would grow without bound."
-                break
-        else:
-            reason = f"{_MOST_HALVINGS} halvings of the step were not enough."
+            break
+        # Half of the step in use, so that the steps of a rung are nested in the next one's.
+        step = rung_plan.step / 2
+        if rung_plan.steps * 2 >= _MOST_STEPS:
+            reason = "the number of steps would grow without bound."
+            break
+    else:
+        reason = f"{_MOST_HALVINGS} halvings of the step were not enough."
     assert best is not None
     outcome, recorder = best
     if status == "failed":

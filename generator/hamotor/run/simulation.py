@@ -18,7 +18,7 @@ from hamotor.run.library import Description, SceneLibrary, Vector, check_method
 from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.report import Origin, report, to_json
 from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
-from hamotor.run.runner import Outcome, Recorder, integrate, meet_tolerance, plan
+from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, meet_tolerance, plan
 
 if TYPE_CHECKING:
     from hamotor.scene import Scene
@@ -95,7 +95,8 @@ class Simulation:
         `step` (s) is shortened if need be so that a whole number of steps ends at `end`.
         `tolerance` instead asks for a step so short that halving it changes the final state by no
         more: the largest change of a motor's component, and of a momentum's relative to its initial
-        norm.  Every `every`-th step is recorded, and always the first and the last state.
+        norm.  Every `every`-th step is recorded, and always the first and the last state; with a
+        tolerance, where the scene cannot know the steps, about two thousand rows if not given.
 
         With `out` the rows stream to that folder, which then holds `run.json`, `trajectory/`,
         pictures and, with `csv`, `trajectory.csv`; without it nothing is written.
@@ -126,32 +127,41 @@ class Simulation:
             return folder.new_recorder(description, csv=csv)
 
         try:
-            recorder: Recorder
-            if step is not None:
-                planned = plan(method, end=end, step=step, every=every or self.every)
-                recorder = new_recorder()
-                outcome = integrate(compiled.library, self.state, planned, recorder, progress=shown)
-            elif tolerance is not None:
-                outcome, recorder = meet_tolerance(
-                    compiled.library,
-                    self.state,
-                    method=method,
-                    end=end,
-                    tolerance=tolerance,
-                    every=every or (self.every if self.every > 1 else None),
-                    new_recorder=new_recorder,
-                    progress=shown,
-                )
-            else:
-                raise UsageError("the scene has neither step nor tolerance; give one of them.")
-            run = self._result(compiled, reason, outcome, recorder, folder)
+            with Interruption() as interruption:
+                recorder: Recorder
+                if step is not None:
+                    planned = plan(method, end=end, step=step, every=_chosen(every, self.every))
+                    recorder = new_recorder()
+                    outcome = integrate(
+                        compiled.library,
+                        self.state,
+                        planned,
+                        recorder,
+                        progress=shown,
+                        interruption=interruption,
+                    )
+                elif tolerance is not None:
+                    outcome, recorder = meet_tolerance(
+                        compiled.library,
+                        self.state,
+                        method=method,
+                        end=end,
+                        tolerance=tolerance,
+                        every=every,
+                        new_recorder=new_recorder,
+                        progress=shown,
+                        interruption=interruption,
+                    )
+                else:
+                    raise UsageError("the scene has neither step nor tolerance; give one of them.")
+                run = self._result(compiled, reason, outcome, recorder, folder)
         except BaseException:
             if folder is not None:
                 folder.abandon()
             raise
         if run.folder is not None and pictures:
             run.plot(run.folder)
-        if outcome.status == "interrupted":
+        if interruption.asked:
             raise RunInterrupted(run)
         if outcome.status == "failed":
             raise RunFailed(f"{self.name}: {outcome.problem}", run)
@@ -233,6 +243,10 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         methods=METHODS,
         scene=read,
     )
+
+
+def _chosen(asked: int | None, default: int) -> int:
+    return default if asked is None else asked
 
 
 def _progress(wanted: bool | Progress) -> Progress:
