@@ -17,6 +17,7 @@ from types import FrameType, TracebackType
 from typing import Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hamotor.errors import NumericsError, UsageError
 from hamotor.run.library import Conserved, Description, LiveRun, Rows, SceneLibrary, Vector
@@ -247,97 +248,89 @@ def integrate(
 def _step_in_chunks(
     live: LiveRun, plan: Plan, recorder: Recorder, progress: Progress, interruption: Interruption
 ) -> Outcome:
-    description = live.description
-    initial = live.observe()
-    initial[0] = 0.0
-    strange = _first_strange(initial[np.newaxis], description)
-    if strange is not None:
-        raise NumericsError(f"{strange[1]} is not finite in the initial state.")
-    watch = _ConservedWatch(description, initial)
-    recorder.append(initial[np.newaxis])
-
-    status: Status = "finished"
+    kept = _KeptRows(live.description, plan, recorder, live.observe())
     problem = ""
-    last = initial
-    kept_at = 0
-    rows_kept = 1
-    done = 0
+    interrupted = False
+    done, chunk = 0, _FIRST_CHUNK_STEPS
     seconds = 0.0
-    chunk = _FIRST_CHUNK_STEPS
-    buffer = np.empty((0, len(description.columns)))
-    while done < plan.steps:
+    buffer = np.empty((0, len(live.description.columns)))
+    while done < plan.steps and not problem:
         if interruption.asked:
-            status = "interrupted"
+            interrupted = True
             break
         asked = min(chunk, plan.steps - done, _ROWS_PER_CHUNK * plan.every)
         due = (done + asked) // plan.every - done // plan.every
         if due > len(buffer):
-            buffer = np.empty((due, len(description.columns)))
+            buffer = np.empty((due, len(live.description.columns)))
         started = time.perf_counter()
         taken = live.advance(asked, plan.every, buffer if due else None)
         spent = time.perf_counter() - started
-        first = done // plan.every + 1
-        done += taken
         seconds += spent
-        rows = buffer[: done // plan.every - first + 1]
-        if len(rows):
-            # A row's time is its index times the step, so that rounding does not pile up.
-            rows[:, 0] = plan.step * (plan.every * np.arange(first, first + len(rows)))
-            strange = _first_strange(rows, description)
-            if strange is not None:
-                rows = rows[: strange[0]]
-                kept = kept_at if not len(rows) else plan.every * (first + len(rows) - 1)
-                bad = plan.every * (first + strange[0])
-                done, status = kept, "failed"
-                problem = (
-                    f"{strange[1]} became non-finite between step {kept} and step {bad} "
-                    f"(t = {bad * plan.step:.6g} s). {_advice(plan)}"
-                )
-            watch.see(rows)
-            recorder.append(rows)
-            rows_kept += len(rows)
-            if len(rows):
-                last = rows[-1].copy()
-                kept_at = plan.every * (first + len(rows) - 1)
-        if status == "failed":
-            break
-        if taken < asked:
-            status = "failed"
-            problem = _failure(live, plan, done, initial)
-            break
+        rows_at = plan.every * np.arange(
+            done // plan.every + 1, (done + taken) // plan.every + 1, dtype=np.int64
+        )
+        problem = kept.keep(buffer[: len(rows_at)], rows_at)
+        done += taken
+        if taken < asked and not problem:
+            kept.keep(live.observe()[np.newaxis], np.array([done]))
+            problem = _failure(live, plan, done, kept.initial)
         progress.advance(done, seconds)
         chunk = _next_chunk(asked, spent)
-    if done > kept_at:
-        row = live.observe()
-        row[0] = plan.step * done
-        if np.isfinite(row).all():
-            watch.see(row[np.newaxis])
-            recorder.append(row[np.newaxis])
-            rows_kept += 1
-            last = row
-        else:
-            strange = _first_strange(row[np.newaxis], description)
-            if status != "failed" and strange is not None:
-                status = "failed"
-                problem = (
-                    f"{strange[1]} became non-finite between step {kept_at} and step {done} "
-                    f"(t = {done * plan.step:.6g} s). {_advice(plan)}"
-                )
-            done = kept_at
+    if kept.step < done and not problem:
+        problem = kept.keep(live.observe()[np.newaxis], np.array([done]))
     largest, total = live.drift()
     return Outcome(
         plan=plan,
-        status=status,
-        steps_done=done,
-        rows=rows_kept,
-        initial=initial,
-        final=last,
-        conserved=watch.errors(last),
+        status="failed" if problem else "interrupted" if interrupted else "finished",
+        steps_done=kept.step,
+        rows=kept.rows,
+        initial=kept.initial,
+        final=kept.last,
+        conserved=kept.conserved.errors(kept.last),
         largest_drift=largest,
         total_drift=total,
         integrate_s=seconds,
         problem=problem,
     )
+
+
+class _KeptRows:
+    """The rows recorded so far: `step` is the index of the last one, `last` the row itself."""
+
+    def __init__(
+        self, description: Description, plan: Plan, recorder: Recorder, initial: Vector
+    ) -> None:
+        self._columns = description.columns
+        self._plan = plan
+        self._recorder = recorder
+        self.initial = self.last = initial
+        self.conserved = _ConservedWatch(description, initial)
+        self.step = self.rows = 0
+        if self.keep(initial[np.newaxis], np.zeros(1, dtype=np.int64)):
+            name = self._columns[int(np.argmin(np.isfinite(initial)))].name
+            raise NumericsError(f"{name} is not finite in the initial state.")
+
+    def keep(self, rows: Rows, steps: NDArray[np.int64]) -> str:
+        """Keep the rows after these steps, up to the first that is not finite; say what is not."""
+        if not len(rows) or (self.rows and steps[0] <= self.step):
+            return ""
+        # A row's time is its index times the step, so that rounding does not pile up.
+        rows[:, 0] = self._plan.step * steps
+        finite = np.isfinite(rows)
+        good = len(rows) if finite.all() else int(np.argmin(finite.all(axis=1)))
+        if good:
+            self.conserved.see(rows[:good])
+            self._recorder.append(rows[:good])
+            self.rows += good
+            self.step = int(steps[good - 1])
+            self.last = rows[good - 1].copy()
+        if good == len(rows):
+            return ""
+        name = self._columns[int(np.argmin(finite[good]))].name
+        return (
+            f"{name} became non-finite between step {self.step} and step {steps[good]} "
+            f"(t = {steps[good] * self._plan.step:.6g} s). {_advice(self._plan)}"
+        )
 
 
 def _next_chunk(asked: int, spent: float) -> int:
@@ -347,26 +340,17 @@ def _next_chunk(asked: int, spent: float) -> int:
     return max(1, int(min(fitting, asked * _LARGEST_GROWTH)))
 
 
-def _first_strange(rows: Rows, description: Description) -> tuple[int, str] | None:
-    """The first row with a non-finite number, and the name of its first such column."""
-    finite = np.isfinite(rows)
-    if finite.all():
-        return None
-    row = int(np.argmin(finite.all(axis=1)))
-    return row, description.columns[int(np.argmin(finite[row]))].name
-
-
 def _failure(live: LiveRun, plan: Plan, done: int, initial: Vector) -> str:
     """Which part of the state left the finite numbers: the one that had grown the most."""
     description = live.description
     columns = description.state_columns()
-    now = np.abs(live.state())
-    growth = now / np.maximum(np.abs(initial[columns]), 1.0)
+    now = live.state()
+    growth = np.abs(now) / np.maximum(np.abs(initial[columns]), 1.0)
     worst = int(np.argmax(growth))
     name = description.columns[columns[worst]].name
     return (
         f"the state became non-finite in step {done + 1}, after t = {done * plan.step:.6g} s. "
-        f"In the last finite state {name} = {live.state()[worst]:.6g} had grown the most. "
+        f"In the last finite state {name} = {now[worst]:.6g} had grown the most. "
         f"{_advice(plan)}"
     )
 
