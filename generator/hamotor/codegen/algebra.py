@@ -13,7 +13,24 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 
 Blade = int
-Multivector = dict[Blade, Fraction]
+Rational = int | Fraction
+"""An exact coefficient; integers stay integers, which is several times faster."""
+Multivector = dict[Blade, Rational]
+
+
+def simplest(x: Rational) -> Rational:
+    """The same number, as an integer if it is one."""
+    return x.numerator if x.denominator == 1 else x
+
+
+def magnitude(x: Rational) -> Rational:
+    """|x|, exact."""
+    return x if x >= 0 else -x
+
+
+def ratio(a: Rational, b: Rational) -> Rational:
+    """a / b, exact."""
+    return simplest(Fraction(a, b))
 
 
 def grade(blade: Blade) -> int:
@@ -21,10 +38,10 @@ def grade(blade: Blade) -> int:
     return blade.bit_count()
 
 
-def add_scaled(into: Multivector, other: Mapping[Blade, Fraction], factor: Fraction) -> None:
+def add_scaled(into: Multivector, other: Mapping[Blade, Rational], factor: Rational) -> None:
     """Add `factor * other` to `into`, dropping what cancels."""
     for blade, coefficient in other.items():
-        total = into.get(blade, Fraction(0)) + factor * coefficient
+        total = into.get(blade, 0) + factor * coefficient
         if total:
             into[blade] = total
         else:
@@ -53,7 +70,7 @@ class Algebra:
 
     name: str
     basis: tuple[str, ...]
-    gram: tuple[tuple[Fraction, ...], ...]
+    gram: tuple[tuple[Rational, ...], ...]
     _products: dict[tuple[Blade, Blade], Multivector] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -86,7 +103,7 @@ class Algebra:
                 for k in range(self.dimension):
                     rows[k][i] += rows[k][j]
                 pivot = i
-            square = rows[pivot][pivot]
+            square = Fraction(rows[pivot][pivot])
             positive, negative = positive + (square > 0), negative + (square < 0)
             live.remove(pivot)
             column = {i: rows[i][pivot] / square for i in live}
@@ -112,7 +129,7 @@ class Algebra:
         bit = 1 << vector
         sign = outer_sign(bit, blade)
         if sign:
-            add_scaled(result, {blade | bit: Fraction(sign)}, Fraction(1))
+            add_scaled(result, {blade | bit: sign}, 1)
         return result
 
     def blade_product(self, a: Blade, b: Blade) -> Multivector:
@@ -122,7 +139,7 @@ class Algebra:
             return known
         result: Multivector = {}
         if a == 0:
-            result[b] = Fraction(1)
+            result[b] = 1
         else:
             # a = v ∧ rest = v rest − v⌋rest
             vector = (a & -a).bit_length() - 1
@@ -145,7 +162,7 @@ class Algebra:
     def outer(self, a: Blade, b: Blade) -> Multivector:
         """Outer product a ∧ b."""
         sign = outer_sign(a, b)
-        return {a | b: Fraction(sign)} if sign else {}
+        return {a | b: sign} if sign else {}
 
     def inner(self, a: Blade, b: Blade) -> Multivector:
         """Symmetric inner product: the part of grade |i − j| (scalars included)."""
@@ -160,10 +177,10 @@ class Algebra:
         return self._graded(a, b, lambda i, j: i - j)
 
     def _symmetrised(self, a: Blade, b: Blade, sign: int) -> Multivector:
-        result: Multivector = {}
-        add_scaled(result, self.blade_product(a, b), Fraction(1, 2))
-        add_scaled(result, self.blade_product(b, a), Fraction(sign, 2))
-        return result
+        twice: Multivector = {}
+        add_scaled(twice, self.blade_product(a, b), 1)
+        add_scaled(twice, self.blade_product(b, a), sign)
+        return {blade: simplest(Fraction(x, 2)) for blade, x in twice.items()}
 
     def commutator(self, a: Blade, b: Blade) -> Multivector:
         """Commutator product a × b = ½(ab − ba)."""
@@ -176,12 +193,12 @@ class Algebra:
     def complement(self, a: Blade) -> Multivector:
         """Right complement a*: a ∧ a* = I.  Needs no metric."""
         rest = self.pseudoscalar ^ a
-        return {rest: Fraction(outer_sign(a, rest))}
+        return {rest: outer_sign(a, rest)}
 
     def complement_inverse(self, a: Blade) -> Multivector:
         """The blade whose right complement is a (the left complement of a)."""
         rest = self.pseudoscalar ^ a
-        return {rest: Fraction(outer_sign(rest, a))}
+        return {rest: outer_sign(rest, a)}
 
     def regressive(self, a: Blade, b: Blade) -> Multivector:
         """Regressive product (join in PGA): (a ∨ b)* = a* ∧ b*."""
@@ -192,7 +209,7 @@ class Algebra:
             add_scaled(result, self.complement_inverse(blade), coefficient * a_sign * b_sign)
         return result
 
-    def multiply(self, a: Mapping[Blade, Fraction], b: Mapping[Blade, Fraction]) -> Multivector:
+    def multiply(self, a: Mapping[Blade, Rational], b: Mapping[Blade, Rational]) -> Multivector:
         """Geometric product of two multivectors."""
         result: Multivector = {}
         for blade_a, x in a.items():

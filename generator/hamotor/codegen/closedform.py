@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
-from hamotor.codegen.algebra import Algebra, Blade, grade
+from hamotor.codegen.algebra import Algebra, Blade, Rational, grade, magnitude, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel, parameters_for, read_off, reversed_value, value_of
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
@@ -59,7 +59,7 @@ class Writer:
         if not p or (len(p) == 1 and len(next(iter(p))) <= 1):
             return p
         content = poly.content(p)
-        self.bindings.append((name, polynomial_expression(poly.scaled(p, 1 / content))))
+        self.bindings.append((name, polynomial_expression(poly.scaled(p, ratio(1, content)))))
         return {(name,): content}
 
 
@@ -73,7 +73,7 @@ class Square:
 
     number: Polynomial
     quad: PolynomialMultivector
-    content: Fraction
+    content: Rational
     omega: Polynomial
 
 
@@ -93,14 +93,14 @@ def _square(
             f"square is a number plus a part of grade 4 whose own square is a number; "
             f"{algebra.name} has {algebra.dimension}"
         )
-    sizes = {abs(x) for p in quad.values() for x in p.values()}
-    content = sizes.pop() if len(sizes) == 1 else Fraction(1)
-    quad = {b: poly.scaled(p, 1 / content) for b, p in quad.items()}
+    sizes: set[Rational] = {magnitude(x) for p in quad.values() for x in p.values()}
+    content: Rational = sizes.pop() if len(sizes) == 1 else 1
+    quad = {b: poly.scaled(p, ratio(1, content)) for b, p in quad.items()}
     number_part = writer.let_polynomial("square", square.get(0, {}))
     return Square(number_part, quad, content, writer.let_polynomial("omega", omega.get(0, {})))
 
 
-def _times(content: Fraction, expression: Expression) -> Expression:
+def _times(content: Rational, expression: Expression) -> Expression:
     return expression if content == 1 else Product(number(content), expression)
 
 
@@ -118,7 +118,7 @@ def _bivector(
         else:
             name = f"b_{algebra.blade_name(blade)}"
             writer.bindings.append((name, polynomial_expression(p)))
-            bound[blade] = {(name,): Fraction(1)}
+            bound[blade] = {(name,): 1}
     return bound
 
 
@@ -133,7 +133,7 @@ def outputs_for(
     values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
     """The components of the result, read off blade coefficients."""
-    names: PolynomialMultivector = {b: {(f"{b}",): Fraction(1)} for b in values}
+    names: PolynomialMultivector = {b: {(f"{b}",): 1} for b in values}
     outputs: list[tuple[str, Expression]] = []
     for component, p in read_off(names, result).items():
         total: Expression | None = None
@@ -211,9 +211,9 @@ def cayley_kernel(
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
     parts = _square(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
-    one: Polynomial = {(): Fraction(1)}
+    one: Polynomial = {(): 1}
     s = polynomial_expression(parts.number)
-    left = poly.added({0: one}, {0: parts.number}, Fraction(-1))[0]
+    left = poly.added({0: one}, {0: parts.number}, -1)[0]
     rest = writer.let("rest", polynomial_expression(left))
     twisted = poly.apply_bilinear(algebra.geometric, b, parts.quad)
     if parts.omega:
@@ -258,10 +258,10 @@ def cayley_inverse_kernel(
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most 5 dimensions")
-    scalar = poly.added({0: {(): Fraction(1)}}, {0: value[0]})[0]
+    scalar = poly.added({0: {(): 1}}, {0: value[0]})[0]
     rest = writer.let("rest", polynomial_expression(scalar))
     twisted = {
-        b: poly.scaled(p, Fraction(-1))
+        b: poly.scaled(p, -1)
         for b, p in poly.apply_bilinear(algebra.geometric, bivector, quad).items()
         if grade(b) == 2
     }
@@ -301,14 +301,14 @@ def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where:
     else:
         factor = writer.let("factor", Quotient(root, radius))
         turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
-        slip = writer.let("slip", Quotient(number(-parts.content / 2), Product(root, radius)))
+        slip = writer.let("slip", Quotient(number(ratio(-parts.content, 2)), Product(root, radius)))
         content = next(iter(parts.quad.values()))
         if len(parts.quad) == 1 and len(content) == 1:
             # one grade-4 blade: take it into the factor, so that each component costs one fma
             ((monomial, x),) = content.items()
             slip = writer.let("turn", Product(slip, polynomial_expression({monomial: x})))
             (blade,) = parts.quad
-            turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): Fraction(1)}})
+            turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): 1}})
         out = _combination([(factor, value), (slip, turned)], {})
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "M (~M M)^(−1/2): the unit versor nearest to M"

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from fractions import Fraction
-
+from hamotor.codegen.algebra import Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import (
     Call,
@@ -33,7 +32,7 @@ PAIRS = {
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 
 
-def number_text(value: Fraction) -> str:
+def number_text(value: Rational) -> str:
     """An exact constant of scalar type S."""
     if value.denominator == 1:
         return f"S({value.numerator})"
@@ -68,6 +67,8 @@ def _text(expression: Expression) -> tuple[str, int]:
             return f"{_wrapped(a, _PRODUCT)} * {_wrapped(b, _UNARY)}", _PRODUCT
         case Quotient(a, b):
             return f"{_wrapped(a, _PRODUCT)} / {_wrapped(b, _ATOM)}", _PRODUCT
+        case MultiplyAdd(_, _, Product() | MultiplyAdd()):
+            return f"dot({', '.join(expression_text(x) for x in _chain(expression))})", _ATOM
         case MultiplyAdd(a, b, c):
             arguments = ", ".join(expression_text(x) for x in (a, b, c))
             return f"mul_add({arguments})", _ATOM
@@ -83,6 +84,17 @@ def _text(expression: Expression) -> tuple[str, int]:
                 ]
             )
             return f"select({listed})", _ATOM
+
+
+def _chain(expression: Expression) -> list[Expression]:
+    """Arguments of `dot` for a chain of multiply-adds, in the order of evaluation."""
+    factors: list[Expression] = []
+    while isinstance(expression, MultiplyAdd):
+        factors = [expression.a, expression.b, *factors]
+        expression = expression.c
+    if isinstance(expression, Product):
+        return [expression.a, expression.b, *factors]
+    return [expression, *factors]
 
 
 def scalar_type(element: Element | None) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from hamotor.codegen.algebra import Algebra, Blade, grades_of
+from hamotor.codegen.algebra import Algebra, Blade, Rational, grades_of, simplest
 
 
 @dataclass(frozen=True)
@@ -15,7 +15,7 @@ class Component:
     """One stored number of an element and the multivector that it multiplies."""
 
     name: str
-    embedding: Mapping[Blade, Fraction]
+    embedding: Mapping[Blade, Rational]
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,11 @@ class Element:
     name: str
     symbol: str
     components: tuple[Component, ...]
-    fixed: Mapping[Blade, Fraction]
+    fixed: Mapping[Blade, Rational]
     unit: bool
     doc: str
     namespace: str = ""
-    functionals: tuple[Mapping[Blade, Fraction], ...] | None = None
+    functionals: tuple[Mapping[Blade, Rational], ...] | None = None
 
     @property
     def cpp_name(self) -> str:
@@ -54,7 +54,7 @@ class Element:
         return grades_of(self.blades)
 
     @cached_property
-    def reading(self) -> tuple[Mapping[Blade, Fraction], ...]:
+    def reading(self) -> tuple[Mapping[Blade, Rational], ...]:
         """For each component the linear functional that reads it off a multivector, exact."""
         if self.functionals is not None:
             return self.functionals
@@ -66,11 +66,11 @@ class Element:
             raise ValueError(f"the components of {self.name} are linearly dependent")
         return tuple(
             {
-                blade: x
+                blade: simplest(x)
                 for blade in blades
                 if (
                     x := sum(
-                        (r * c.get(blade, Fraction(0)) for r, c in zip(row, columns, strict=True)),
+                        (r * c.get(blade, 0) for r, c in zip(row, columns, strict=True)),
                         Fraction(0),
                     )
                 )
@@ -87,8 +87,8 @@ class Element:
         )
 
 
-def _dot(a: Mapping[Blade, Fraction], b: Mapping[Blade, Fraction]) -> Fraction:
-    return sum((x * b[blade] for blade, x in a.items() if blade in b), Fraction(0))
+def _dot(a: Mapping[Blade, Rational], b: Mapping[Blade, Rational]) -> Fraction:
+    return sum((Fraction(x * b[blade]) for blade, x in a.items() if blade in b), Fraction(0))
 
 
 def inverse_matrix(matrix: list[list[Fraction]]) -> list[list[Fraction]] | None:
@@ -111,4 +111,4 @@ def inverse_matrix(matrix: list[list[Fraction]]) -> list[list[Fraction]] | None:
 def blade_component(algebra: Algebra, name: str) -> Component:
     """Component named after an oriented blade, e.g. `e31` holds the coefficient of e3 ∧ e1."""
     blade, sign = algebra.parse_blade(name)
-    return Component(name, {blade: Fraction(sign)})
+    return Component(name, {blade: sign})

@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
 
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, add_scaled, grade
+from hamotor.codegen.algebra import (
+    Algebra,
+    Blade,
+    Multivector,
+    Rational,
+    add_scaled,
+    grade,
+    simplest,
+)
 from hamotor.codegen.element import Component, Element, inverse_matrix
 from hamotor.errors import UsageError
 
@@ -16,7 +24,7 @@ class Generator:
     """One generator E_a (a bivector) and the names of its rate and momentum coordinates."""
 
     name: str
-    bivector: Mapping[Blade, Fraction]
+    bivector: Mapping[Blade, Rational]
     rate: str
     momentum: str
 
@@ -35,7 +43,7 @@ class LieGroup:
     generators: tuple[Generator, ...]
     rate: Element
     momentum: Element
-    structure: tuple[tuple[tuple[Fraction, ...], ...], ...]
+    structure: tuple[tuple[tuple[Rational, ...], ...], ...]
 
 
 def lie_group(
@@ -85,11 +93,11 @@ def lie_group(
     return LieGroup(name, description, element, generators, rate, momentum, structure)
 
 
-def _wedge(algebra: Algebra, a: Mapping[Blade, Fraction], b: Mapping[Blade, Fraction]) -> Fraction:
+def _wedge(algebra: Algebra, a: Mapping[Blade, Rational], b: Mapping[Blade, Rational]) -> Fraction:
     """Coefficient of I in a ∧ b."""
     return sum(
         (
-            x * y * algebra.outer(blade_a, blade_b).get(algebra.pseudoscalar, Fraction(0))
+            Fraction(x * y * algebra.outer(blade_a, blade_b).get(algebra.pseudoscalar, 0))
             for blade_a, x in a.items()
             for blade_b, y in b.items()
         ),
@@ -97,7 +105,7 @@ def _wedge(algebra: Algebra, a: Mapping[Blade, Fraction], b: Mapping[Blade, Frac
     )
 
 
-def _pairing_with(algebra: Algebra, bivector: Mapping[Blade, Fraction]) -> Multivector:
+def _pairing_with(algebra: Algebra, bivector: Mapping[Blade, Rational]) -> Multivector:
     """The functional m ↦ (m ∧ E) / I on (n−2)-vectors."""
     result: Multivector = {}
     for blade, x in bivector.items():
@@ -123,18 +131,18 @@ def _dual_basis(
     for row in inverse:
         total = {}
         for x, complement in zip(row, complements, strict=True):
-            add_scaled(total, complement, x)
+            add_scaled(total, complement, simplest(x))
         dual.append(total)
     return dual
 
 
 def _bracket(
     algebra: Algebra, rate: Element, name: str, a: Generator, b: Generator, where: str
-) -> tuple[Fraction, ...]:
+) -> tuple[Rational, ...]:
     bracket = algebra.multiply(a.bivector, b.bivector)
-    add_scaled(bracket, algebra.multiply(b.bivector, a.bivector), Fraction(-1))
+    add_scaled(bracket, algebra.multiply(b.bivector, a.bivector), -1)
     coordinates = tuple(
-        sum((x * bracket.get(blade, Fraction(0)) for blade, x in reading.items()), Fraction(0))
+        sum((x * bracket.get(blade, 0) for blade, x in reading.items()), 0)
         for reading in rate.reading
     )
     rest = dict(bracket)
@@ -153,7 +161,7 @@ def _prove_invariance(
     algebra: Algebra,
     rate: Element,
     momentum: Element,
-    structure: tuple[tuple[tuple[Fraction, ...], ...], ...],
+    structure: tuple[tuple[tuple[Rational, ...], ...], ...],
     where: str,
 ) -> None:
     """Prove (ad*_B μ)(ζ) = μ([B, ζ]) with (ad*_B μ) read off [μ, B] (theory.md §2, factor 1)."""
@@ -163,12 +171,12 @@ def _prove_invariance(
             add_scaled(
                 bracket,
                 algebra.multiply(rate_component.embedding, momentum_component.embedding),
-                Fraction(-1),
+                -1,
             )
             for z, reading in enumerate(momentum.reading):
                 found = sum(
-                    (x * bracket.get(blade, Fraction(0)) for blade, x in reading.items()),
-                    Fraction(0),
+                    (x * bracket.get(blade, 0) for blade, x in reading.items()),
+                    0,
                 )
                 if found != structure[b][z][m]:
                     raise UsageError(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, reverse_sign
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, ratio, reverse_sign
 from hamotor.codegen.element import Element
 from hamotor.codegen.nullsplit import hyperbolic_pairs, split_program
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
@@ -26,7 +26,7 @@ from hamotor.codegen.program import (
     polynomial_expression,
 )
 
-ONE: Polynomial = {(): Fraction(1)}
+ONE: Polynomial = {(): 1}
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def product_kernel(
     right: Element,
     result: Element,
     namespace: str = "",
-    factor: Fraction = Fraction(1),
+    factor: Rational = 1,
 ) -> Kernel:
     """A bilinear product, read off in `result`; `factor` multiplies it."""
     a, b = parameters_for(left, right)
@@ -168,7 +168,7 @@ class Staging:
         if len(polynomial) == 1 and len(next(iter(polynomial))) <= 1:
             return polynomial
         content = poly.content(polynomial)
-        primitive = poly.scaled(polynomial, 1 / content)
+        primitive = poly.scaled(polynomial, ratio(1, content))
         self.bindings.append((name, polynomial_expression(primitive)))
         self.meaning[name] = primitive
         return {(name,): content}
@@ -210,7 +210,7 @@ def sandwich_kernel(
             outputs.append((component.name, kept))
             continue
         content = 2 * poly.content(rest)
-        inner = polynomial_expression(poly.scaled(rest, 2 / content))
+        inner = polynomial_expression(poly.scaled(rest, ratio(2, content)))
         factor = number(content)
         if still[component.name]:
             outputs.append((component.name, MultiplyAdd(factor, inner, kept)))
@@ -224,7 +224,7 @@ def sandwich_kernel(
         reversed_value(motor),
     )
     norm = poly.apply_bilinear(algebra.geometric, motor, reversed_value(motor))
-    defect = poly.added({0: ONE}, norm, Fraction(-1))
+    defect = poly.added({0: ONE}, norm, -1)
     meaning = read_off(
         poly.added(both, poly.apply_bilinear(algebra.geometric, value, defect)), result
     )

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from fractions import Fraction
 
 from hamotor.codegen import closedform, transcendental
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, grade
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import (
@@ -21,7 +20,7 @@ from hamotor.codegen.kernel import (
     sandwich_kernel,
     value_of,
 )
-from hamotor.codegen.polynomial import PolynomialMultivector, apply_bilinear, scaled
+from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
 from hamotor.codegen.spec import AlgebraSpec, Request
 from hamotor.errors import UsageError
 
@@ -174,7 +173,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         left: Element,
         right: Element,
         result: Element,
-        factor: Fraction = Fraction(1),
+        factor: Rational = 1,
     ) -> Kernel:
         return product_kernel(algebra, name, law, table, left, right, result, namespace, factor)
 
@@ -213,7 +212,8 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
     kernels.append(exp_kernel(algebra, rate, element, namespace, where))
-    if transcendental.split_bivectors(algebra, rate.blades) is not None:
+    plane = transcendental.split_bivectors(algebra, rate.blades)
+    if plane is not None and plane.rotation:
         kernels.append(transcendental.log_kernel(algebra, element, rate, namespace, where))
     kernels += [
         closedform.cayley_kernel(algebra, rate, element, namespace, where),
@@ -235,9 +235,9 @@ def _pairing(group: LieGroup) -> Kernel:
     """<μ, w> = Σ μ_a w_a, since rate and momentum coordinates are dual."""
     parameters = parameters_for(group.momentum, group.rate)
     mu, w = parameters
-    meaning = {
+    meaning: dict[str, Polynomial] = {
         "s": {
-            tuple(sorted((f"{mu.name}.{g.momentum}", f"{w.name}.{g.rate}"))): Fraction(1)
+            tuple(sorted((f"{mu.name}.{g.momentum}", f"{w.name}.{g.rate}"))): 1
             for g in group.generators
         }
     }

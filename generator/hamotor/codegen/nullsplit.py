@@ -10,10 +10,9 @@ the change of basis is applied to any bilinear product, and the cost decides.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
-from hamotor.codegen.algebra import Algebra, Blade, Multivector
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
@@ -38,12 +37,12 @@ def hyperbolic_pairs(algebra: Algebra) -> list[tuple[int, int]]:
     return pairs
 
 
-def _times_pair(algebra: Algebra, pair: tuple[int, int], blade: Blade) -> tuple[Blade, Fraction]:
+def _times_pair(algebra: Algebra, pair: tuple[int, int], blade: Blade) -> tuple[Blade, Rational]:
     """A E/g for a blade A without the pair: a blade and its coefficient."""
     i, j = pair
     both = 1 << i | 1 << j
     sign = algebra.outer(blade, both)[blade | both]
-    return blade | both, sign / algebra.gram[i][j]
+    return blade | both, ratio(sign, algebra.gram[i][j])
 
 
 def split_program(
@@ -54,7 +53,7 @@ def split_program(
         tuple[Parameter, PolynomialMultivector], tuple[Parameter, PolynomialMultivector]
     ],
     result: Element,
-    factor: Fraction,
+    factor: Rational,
 ) -> Program | None:
     """The product computed in the basis A P±; None where an operand or the result forbids it."""
     if not result.is_blades:
@@ -69,45 +68,47 @@ def split_program(
     def out(blade: Blade, p: Polynomial) -> None:
         component = by_blade[blade]
         outputs[component.name] = polynomial_expression(
-            poly.scaled(p, factor / component.embedding[blade])
+            poly.scaled(p, ratio(factor, component.embedding[blade]))
         )
 
     for blade, half_sum in by_blade.items():
         if blade & both == both and blade ^ both in by_blade:
             continue
-        other, sign = (0, Fraction(0)) if blade & both else _times_pair(algebra, pair, blade)
+        other, sign = (0, 0) if blade & both else _times_pair(algebra, pair, blade)
         if other not in by_blade or blade & both:
             out(blade, turned.get(blade, {}))
             continue
         name = algebra.blade_name(blade)
         plus, minus = dict(turned.get(blade, {})), dict(turned.get(blade, {}))
         rest = turned.get(other, {})
-        poly.add_scaled(plus, rest, 1 / sign)
-        poly.add_scaled(minus, rest, -1 / sign)
+        poly.add_scaled(plus, rest, ratio(1, sign))
+        poly.add_scaled(minus, rest, ratio(-1, sign))
         halves: dict[str, Polynomial] = {}
         for half, p in (("plus", plus), ("minus", minus)):
             if p:
                 bindings.append((f"{half}_{name}", polynomial_expression(p)))
-                halves[half] = {(f"{half}_{name}",): Fraction(1)}
+                halves[half] = {(f"{half}_{name}",): 1}
         total: Polynomial = {}
         difference: Polynomial = {}
         for half, sign_of_half in (("plus", 1), ("minus", -1)):
-            poly.add_scaled(total, halves.get(half, {}), Fraction(1))
-            poly.add_scaled(difference, halves.get(half, {}), Fraction(sign_of_half))
+            poly.add_scaled(total, halves.get(half, {}), 1)
+            poly.add_scaled(difference, halves.get(half, {}), sign_of_half)
         half_difference = by_blade[other]
-        outputs[half_sum.name] = _halved(total, factor / half_sum.embedding[blade])
+        outputs[half_sum.name] = _halved(total, ratio(factor, half_sum.embedding[blade]))
         outputs[half_difference.name] = _halved(
-            difference, factor * sign / half_difference.embedding[other]
+            difference, ratio(factor * sign, half_difference.embedding[other])
         )
     ordered = tuple((c.name, outputs[c.name]) for c in result.components)
     return Program(tuple(p for p, _ in operands), tuple(bindings), ordered, result)
 
 
-def _halved(p: Polynomial, factor: Fraction) -> Expression:
+def _halved(p: Polynomial, factor: Rational) -> Expression:
     if not p:
         return number(0)
-    content = poly.content(p) * factor / 2
-    return Product(number(content), polynomial_expression(poly.scaled(p, 1 / poly.content(p))))
+    content = ratio(poly.content(p) * factor, 2)
+    return Product(
+        number(content), polynomial_expression(poly.scaled(p, ratio(1, poly.content(p))))
+    )
 
 
 def _split_value(
@@ -128,17 +129,17 @@ def _split_value(
         parts: dict[int, Polynomial] = {}
         for direction, half in ((1, "plus"), (-1, "minus")):
             total: Polynomial = dict(value.get(blade, {}))
-            poly.add_scaled(total, value.get(other, {}), direction / sign)
+            poly.add_scaled(total, value.get(other, {}), ratio(direction, sign))
             if len(total) > 1:
                 name = f"{prefix}_{half}_{algebra.blade_name(blade)}"
                 bindings.append((name, polynomial_expression(total)))
-                total = {(name,): Fraction(1)}
+                total = {(name,): 1}
             parts[direction] = total
         plus, minus = parts[1], parts[-1]
-        for target, sum_sign, scale in ((blade, 1, Fraction(1)), (other, -1, sign)):
+        for target, sum_sign, scale in ((blade, 1, 1), (other, -1, sign)):
             mixed: Polynomial = {}
-            poly.add_scaled(mixed, plus, scale / 2)
-            poly.add_scaled(mixed, minus, sum_sign * scale / 2)
+            poly.add_scaled(mixed, plus, ratio(scale, 2))
+            poly.add_scaled(mixed, minus, ratio(sum_sign * scale, 2))
             if mixed:
                 result[target] = mixed
     return result

@@ -6,31 +6,31 @@ from collections.abc import Callable, Mapping
 from fractions import Fraction
 from math import gcd, lcm
 
-from hamotor.codegen.algebra import Blade, Multivector
+from hamotor.codegen.algebra import Blade, Multivector, Rational, simplest
 
 Monomial = tuple[str, ...]
-Polynomial = dict[Monomial, Fraction]
+Polynomial = dict[Monomial, Rational]
 """Sorted factor names → exact coefficient; no zero coefficients are stored."""
 
 PolynomialMultivector = dict[Blade, Polynomial]
 
 
-def add_term(into: Polynomial, monomial: Monomial, coefficient: Fraction) -> None:
+def add_term(into: Polynomial, monomial: Monomial, coefficient: Rational) -> None:
     """Add one term, dropping it if it cancels."""
-    total = into.get(monomial, Fraction(0)) + coefficient
+    total = into.get(monomial, 0) + coefficient
     if total:
         into[monomial] = total
     else:
         into.pop(monomial, None)
 
 
-def add_scaled(into: Polynomial, other: Mapping[Monomial, Fraction], factor: Fraction) -> None:
+def add_scaled(into: Polynomial, other: Mapping[Monomial, Rational], factor: Rational) -> None:
     """Add `factor * other` to `into`."""
     for monomial, coefficient in other.items():
         add_term(into, monomial, factor * coefficient)
 
 
-def times(a: Mapping[Monomial, Fraction], b: Mapping[Monomial, Fraction]) -> Polynomial:
+def times(a: Mapping[Monomial, Rational], b: Mapping[Monomial, Rational]) -> Polynomial:
     """Product of two polynomials."""
     result: Polynomial = {}
     for left, x in a.items():
@@ -39,18 +39,18 @@ def times(a: Mapping[Monomial, Fraction], b: Mapping[Monomial, Fraction]) -> Pol
     return result
 
 
-def content(polynomial: Mapping[Monomial, Fraction]) -> Fraction:
+def content(polynomial: Mapping[Monomial, Rational]) -> Rational:
     """Greatest common divisor of the coefficients, with the sign of the first term."""
     coefficients = list(polynomial.values())
     numerator = gcd(*(c.numerator for c in coefficients))
     denominator = lcm(*(c.denominator for c in coefficients))
     sign = -1 if all(c < 0 for c in coefficients) else 1
-    return Fraction(sign * numerator, denominator)
+    return simplest(Fraction(sign * numerator, denominator))
 
 
-def scaled(a: Mapping[Monomial, Fraction], factor: Fraction) -> Polynomial:
+def scaled(a: Mapping[Monomial, Rational], factor: Rational) -> Polynomial:
     """`factor * a`."""
-    return {m: factor * c for m, c in a.items()} if factor else {}
+    return {m: simplest(factor * c) for m, c in a.items()} if factor else {}
 
 
 def apply_bilinear(
@@ -73,7 +73,7 @@ def apply_bilinear(
 
 
 def added(
-    a: Mapping[Blade, Polynomial], b: Mapping[Blade, Polynomial], factor: Fraction = Fraction(1)
+    a: Mapping[Blade, Polynomial], b: Mapping[Blade, Polynomial], factor: Rational = 1
 ) -> PolynomialMultivector:
     """`a + factor * b`."""
     result: PolynomialMultivector = {blade: dict(p) for blade, p in a.items()}
@@ -83,13 +83,13 @@ def added(
 
 
 def substituted(
-    polynomial: Mapping[Monomial, Fraction], values: Mapping[str, Polynomial]
+    polynomial: Mapping[Monomial, Rational], values: Mapping[str, Polynomial]
 ) -> Polynomial:
     """Replace every name found in `values` by its polynomial."""
     result: Polynomial = {}
     for monomial, coefficient in polynomial.items():
         term: Polynomial = {(): coefficient}
         for name in monomial:
-            term = times(term, values[name] if name in values else {(name,): Fraction(1)})
-        add_scaled(result, term, Fraction(1))
+            term = times(term, values.get(name, {(name,): 1}))
+        add_scaled(result, term, 1)
     return result

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from fractions import Fraction
 from typing import Any
 
+from hamotor.codegen.algebra import Rational, magnitude
 from hamotor.codegen.element import Element
 from hamotor.codegen.polynomial import Polynomial, add_scaled, scaled, times
 
@@ -26,7 +26,7 @@ class Name:
 class Number:
     """An exact rational constant."""
 
-    value: Fraction
+    value: Rational
 
 
 @dataclass(frozen=True)
@@ -234,20 +234,20 @@ def _node_cost(node: Expression) -> Cost:
 def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomial:
     match expression:
         case Name(text):
-            return dict(known[text]) if text in known else {(text,): Fraction(1)}
+            return dict(known[text]) if text in known else {(text,): 1}
         case Number(value):
             return {(): value} if value else {}
         case Negative(x):
-            return scaled(_expand(x, known), Fraction(-1))
+            return scaled(_expand(x, known), -1)
         case Sum(a, b):
             total = _expand(a, known)
-            add_scaled(total, _expand(b, known), Fraction(1))
+            add_scaled(total, _expand(b, known), 1)
             return total
         case Product(a, b):
             return times(_expand(a, known), _expand(b, known))
         case MultiplyAdd(a, b, c):
             total = _expand(c, known)
-            add_scaled(total, times(_expand(a, known), _expand(b, known)), Fraction(1))
+            add_scaled(total, times(_expand(a, known), _expand(b, known)), 1)
             return total
         case _:
             raise ValueError(f"not a polynomial: {expression}")
@@ -281,9 +281,9 @@ def _evaluate(
 # ---------------------------------------------------------------- building expressions
 
 
-def number(value: int | Fraction) -> Number:
+def number(value: Rational) -> Number:
     """An exact constant."""
-    return Number(Fraction(value))
+    return Number(value)
 
 
 def negative(x: Expression) -> Expression:
@@ -329,19 +329,19 @@ def polynomial_expression(polynomial: Polynomial) -> Expression:
     """
     if not polynomial:
         return number(0)
-    groups: dict[Fraction, list[tuple[Expression, ...]]] = {}
+    groups: dict[Rational, list[tuple[Expression, ...]]] = {}
     for monomial, coefficient in polynomial.items():
         factors: list[Expression] = [Name(text) for text in monomial]
-        size = abs(coefficient)
+        size = magnitude(coefficient)
         if not factors:
-            groups.setdefault(Fraction(1), []).append((Number(coefficient),))
+            groups.setdefault(1, []).append((Number(coefficient),))
             continue
         if coefficient < 0:
             factors[0] = negative(factors[0])
         if len(factors) > 2:
             raise ValueError(f"a term has more than two factors: {monomial}")
         groups.setdefault(size, []).append(tuple(factors))
-    unscaled = groups.pop(Fraction(1), [])
+    unscaled = groups.pop(1, [])
     terms = [*((Number(size), sum_of_products(group)) for size, group in groups.items())]
     if not unscaled and len(terms) == 1:
         return Product(*terms[0])

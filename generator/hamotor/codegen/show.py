@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from fractions import Fraction
 
 from hamotor.codegen import tree
-from hamotor.codegen.algebra import Algebra, Blade, grade
+from hamotor.codegen.algebra import Algebra, Blade, Rational, grade
 from hamotor.codegen.compiler import SourceFile, kernel_data, kernel_title
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel
@@ -79,7 +78,7 @@ def table(algebra: str, product: str) -> str:
         )
     space, multiply = spec.algebra, bilinear(spec.algebra, product)
     blades = sorted(range(1 << space.dimension), key=lambda b: (grade(b), b))
-    head = [_cell(space, {b: Fraction(1)}) for b in blades]
+    head = [_cell(space, {b: 1}) for b in blades]
     rows = [["", *head]]
     for a, name in zip(blades, head, strict=True):
         rows.append([name, *(_cell(space, multiply(a, b)) for b in blades)])
@@ -186,7 +185,7 @@ def _text(kernel: Kernel, notes: Sequence[str]) -> str:
     return file.text.rstrip("\n")
 
 
-def _cell(algebra: Algebra, value: Mapping[Blade, Fraction]) -> str:
+def _cell(algebra: Algebra, value: Mapping[Blade, Rational]) -> str:
     """`-e12`, `-1+e04` or `1/2·e12`; `.` for 0."""
     text = ""
     for blade, x in sorted(value.items()):

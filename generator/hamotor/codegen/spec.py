@@ -11,7 +11,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from hamotor.codegen.algebra import Algebra, Blade
+from hamotor.codegen.algebra import Algebra, Blade, Rational, simplest
 from hamotor.codegen.element import Component, Element, blade_component
 from hamotor.codegen.group import Generator, LieGroup, lie_group
 from hamotor.errors import UsageError, suggest
@@ -173,13 +173,13 @@ class _Reader:
             raise self.fail(where, f'"{key}" = "{value}" must match [A-Za-z][A-Za-z0-9_]*')
         return value
 
-    def rational(self, value: Any, where: str) -> Fraction:
+    def rational(self, value: Any, where: str) -> Rational:
         if isinstance(value, bool) or not isinstance(value, int | str):
             raise self.fail(
                 where, f'{value!r} must be an integer or a fraction in a text, like "-1/2"'
             )
         try:
-            return Fraction(value)
+            return simplest(Fraction(value))
         except (ValueError, ZeroDivisionError) as error:
             raise self.fail(where, f"{value!r} is not a fraction") from error
 
@@ -219,9 +219,7 @@ class _Reader:
             ]
             if len(squares) != size:
                 raise self.fail("gram.diagonal", f"{len(squares)} numbers for {size} basis vectors")
-            rows = [
-                [squares[i] if i == j else Fraction(0) for j in range(size)] for i in range(size)
-            ]
+            rows = [[squares[i] if i == j else 0 for j in range(size)] for i in range(size)]
         else:
             rows = [
                 [self.rational(x, "gram.matrix") for x in self.array(row, "gram.matrix")]
@@ -249,8 +247,8 @@ class _Reader:
         except ValueError as error:
             raise self.fail(where, str(error)) from error
 
-    def multivector(self, algebra: Algebra, value: Any, where: str) -> dict[Blade, Fraction]:
-        result: dict[Blade, Fraction] = {}
+    def multivector(self, algebra: Algebra, value: Any, where: str) -> dict[Blade, Rational]:
+        result: dict[Blade, Rational] = {}
         for text, coefficient in self.table(value, where).items():
             blade, sign = self.blade(algebra, text, where)
             if blade in result:

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, grade
@@ -73,12 +72,10 @@ class Plane:
 
 def split_bivectors(algebra: Algebra, blades: Sequence[Blade]) -> Plane | None:
     """Split the bivector blades; None where the closed forms here do not apply."""
-    names: PolynomialMultivector = {b: {(algebra.blade_name(b),): Fraction(1)} for b in blades}
+    names: PolynomialMultivector = {b: {(algebra.blade_name(b),): 1} for b in blades}
     square = poly.apply_bilinear(algebra.geometric, names, names)
-    rotation = [
-        b for b in blades if square.get(0, {}).get((algebra.blade_name(b),) * 2, Fraction(0))
-    ]
-    scalar = {(algebra.blade_name(b),) * 2: Fraction(-1) for b in rotation}
+    rotation = [b for b in blades if square.get(0, {}).get((algebra.blade_name(b),) * 2, 0)]
+    scalar = {(algebra.blade_name(b),) * 2: -1 for b in rotation}
     quad = [b for b in square if grade(b) == 4]
     translation = [b for b in blades if b not in rotation]
     pitch: list[tuple[Blade, Blade, int]] = []
@@ -153,7 +150,7 @@ def _outputs(
     values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
     """Read the components of the result off named blade coefficients."""
-    names: PolynomialMultivector = {b: {(f"#{b}",): Fraction(1)} for b in values}
+    names: PolynomialMultivector = {b: {(f"#{b}",): 1} for b in values}
     outputs: list[tuple[str, Expression]] = []
     for component, p in read_off(names, result).items():
         if len(p) == 1:

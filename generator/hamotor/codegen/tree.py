@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,18 +36,24 @@ def formatted(files: Sequence[SourceFile]) -> tuple[SourceFile, ...]:
             path = Path(folder) / f"{index}.cpp"
             path.write_text(file.text, encoding="utf-8")
             names.append(str(path))
-        command = [str(tool), f"--style=file:{ROOT / '.clang-format'}", "-i", *names]
-        try:
-            subprocess.run(command, check=True, capture_output=True, text=True)
-        except (OSError, subprocess.CalledProcessError) as error:
-            detail = error.stderr if isinstance(error, subprocess.CalledProcessError) else error
-            raise ToolError(
-                f"clang-format failed: {detail}; remove .hamotor/venv and run ./hamotor again"
-            ) from error
+        command = [str(tool), f"--style=file:{ROOT / '.clang-format'}", "-i"]
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            largest_first = sorted(names, key=lambda name: -Path(name).stat().st_size)
+            list(pool.map(lambda name: _run([*command, name]), largest_first))
         texts = {
             f.path: Path(n).read_text(encoding="utf-8") for f, n in zip(headers, names, strict=True)
         }
     return tuple(SourceFile(f.path, texts.get(f.path, f.text)) for f in files)
+
+
+def _run(command: Sequence[str]) -> None:
+    try:
+        subprocess.run(command, check=True, capture_output=True, text=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        detail = error.stderr if isinstance(error, subprocess.CalledProcessError) else error
+        raise ToolError(
+            f"clang-format failed: {detail}; remove .hamotor/venv and run ./hamotor again"
+        ) from error
 
 
 def differences(

@@ -29,6 +29,33 @@ template <class S>
 #endif
 }
 
+namespace detail {
+
+template <class S>
+[[nodiscard]] constexpr S dot_onto(const S& sum) noexcept {
+  return sum;
+}
+
+template <class S, class... Rest>
+[[nodiscard]] constexpr S dot_onto(const S& sum, const S& a, const S& b,
+                                   const Rest&... rest) noexcept {
+  return dot_onto(mul_add(a, b, sum), rest...);
+}
+
+}  // namespace detail
+
+/// a₁ b₁ + a₂ b₂ + …, one multiply-add after the other in this order.  With an odd number of
+/// arguments the first one is added: c + a₁ b₁ + a₂ b₂ + ….
+template <class S, class... Rest>
+[[nodiscard]] constexpr S dot(const S& x, const Rest&... rest) noexcept {
+  if constexpr (sizeof...(Rest) % 2 == 0) {
+    return detail::dot_onto(x, rest...);
+  } else {
+    return [&x](const S& y, const auto&... more) { return detail::dot_onto(x * y, more...); }(
+        rest...);
+  }
+}
+
 /// `a` where the condition holds, else `b`: both are evaluated, so that lanes share one text.
 template <class S>
 [[nodiscard]] constexpr S select(bool condition, const S& a, const S& b) noexcept {
