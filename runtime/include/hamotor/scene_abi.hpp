@@ -1,0 +1,498 @@
+// The compiled scene's C ABI, version 1: a scene as a type becomes a shared library.
+//
+// A scene is a struct with the members listed in `SceneDefinition`; HAMOTOR_SCENE(MyScene) defines
+// the C functions for it.  States cross the boundary as doubles in the user's body frames; inside,
+// bodies stand in their principal frames.  Nothing throws across it.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <new>
+#include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
+#include <variant>
+
+#include "hamotor/scalar.hpp"
+#include "hamotor/space.hpp"
+#include "hamotor/state.hpp"
+#include "hamotor/steppers.hpp"
+#include "hamotor/systems.hpp"
+
+namespace hamotor {
+
+/// What a conserved quantity is computed from.
+enum class Quantity {
+  energy,            ///< H
+  spatial_momentum,  ///< a combination of the total momentum in the world frame
+  p_squared,         ///< |P|² of one body, a Casimir
+  p_dot_pi,          ///< P·Π of one body, a Casimir
+  pi_squared         ///< |Π|² of one body, a Casimir of the rotations
+};
+
+/// A quantity that the exact motion of a scene keeps constant.
+template <class G>
+struct Conserved {
+  Quantity quantity;
+  std::string_view name;  ///< of its column: energy, spatial_momentum.e12, NAME.casimir.p_squared
+  std::string_view unit;  ///< of its column
+  std::string_view description;  ///< in words
+  std::size_t body = 0;          ///< whose Casimir it is
+  std::array<double, static_cast<std::size_t>(G::dimension)> coefficients{};  ///< of a momentum
+  /// Columns over whose Euclidean norm at the start a relative error is taken; empty names end
+  /// them.
+  std::array<std::string_view, static_cast<std::size_t>(G::dimension)> norm{};
+  double scale = 0;  ///< what to divide by where there are none; 0: no natural scale
+};
+
+/// What a compiled scene says about itself, as a type.
+template <class Scene>
+concept SceneDefinition =
+    requires {
+      typename Scene::Group;
+      typename Scene::Scalar;
+      { Scene::name } -> std::convertible_to<std::string_view>;
+      { Scene::kernels } -> std::convertible_to<std::string_view>;   // "generated" or "generic"
+      { Scene::bodies.size() } -> std::convertible_to<std::size_t>;  // std::array of names
+      {
+        Scene::frames.size()
+      } -> std::convertible_to<std::size_t>;  // std::array of N: motors from
+                                              // principal to body frame
+      { Scene::conserved.size() } -> std::convertible_to<std::size_t>;  // std::array of Conserved
+      Scene::system;
+    } && HamiltonianSystem<std::remove_cvref_t<decltype(Scene::system)>> &&
+    std::remove_cvref_t<decltype(Scene::system)>::bodies == Scene::bodies.size() &&
+    std::remove_cvref_t<decltype(Scene::system)>::bodies == Scene::frames.size();
+
+namespace scene {
+
+template <class Scene>
+using SystemOf = std::remove_cvref_t<decltype(Scene::system)>;
+
+template <class Scene>
+inline constexpr std::size_t motor_size =
+    Scene::Group::template Element<typename Scene::Scalar>::size;
+template <class Scene>
+inline constexpr auto momentum_size = static_cast<std::size_t>(Scene::Group::dimension);
+template <class Scene>
+inline constexpr std::size_t body_size = motor_size<Scene> + momentum_size<Scene>;
+template <class Scene>
+inline constexpr std::size_t position_size = Space<typename Scene::Group>::dimension;
+
+/// Whether a quantity has a column of its own: one component of the spatial momentum has one
+/// anyway.
+template <class G>
+[[nodiscard]] constexpr bool has_own_column(const Conserved<G>& conserved) noexcept {
+  if (conserved.quantity == Quantity::energy) return false;
+  if (conserved.quantity != Quantity::spatial_momentum) return true;
+  std::size_t terms = 0;
+  bool unit = true;
+  for (const double c : conserved.coefficients) {
+    if (c != 0) {
+      ++terms;
+      unit = unit && c == 1;
+    }
+  }
+  return terms != 1 || !unit;
+}
+
+template <class Scene>
+[[nodiscard]] constexpr std::size_t columns() noexcept {
+  std::size_t count =
+      1 + Scene::bodies.size() * (body_size<Scene> + position_size<Scene>)+1 + momentum_size<Scene>;
+  for (const auto& conserved : Scene::conserved) count += has_own_column(conserved) ? 1U : 0U;
+  return count;
+}
+
+/// A blade that holds e0 measures lengths.
+[[nodiscard]] constexpr bool is_ideal(std::string_view blade) noexcept {
+  return blade.size() > 1 && blade[1] == '0';
+}
+
+/// `text` as a JSON string.
+[[nodiscard]] inline std::string json_string(std::string_view text) {
+  constexpr std::string_view digits = "0123456789abcdef";
+  std::string result = "\"";
+  for (const char c : text) {
+    const auto code = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      result += '\\';
+      result += c;
+    } else if (code < 0x20) {
+      result += "\\u00";
+      result += digits[code >> 4U];
+      result += digits[code & 15U];
+    } else {
+      result += c;
+    }
+  }
+  return result + '"';
+}
+
+/// A JSON array of the texts that `items` appends.
+class JsonList {
+ public:
+  void add(const std::string& item) { text_ += (text_.empty() ? "" : ", ") + item; }
+  [[nodiscard]] std::string text() const { return '[' + text_ + ']'; }
+
+ private:
+  std::string text_;
+};
+
+template <class Names>
+[[nodiscard]] std::string json_strings(const Names& names) {
+  JsonList list;
+  for (const auto& name : names) list.add(json_string(name));
+  return list.text();
+}
+
+[[nodiscard]] inline std::string compiler() {
+#if defined(__clang__)
+  return "clang++ " __clang_version__;
+#elif defined(__GNUC__)
+  return "g++ " + std::to_string(__GNUC__) + '.' + std::to_string(__GNUC_MINOR__) + '.' +
+         std::to_string(__GNUC_PATCHLEVEL__);
+#else
+  return "unknown";
+#endif
+}
+
+template <class S>
+[[nodiscard]] constexpr std::string_view scalar_name() noexcept {
+  if constexpr (std::is_same_v<S, float>) {
+    return "float";
+  } else if constexpr (std::is_same_v<S, double>) {
+    return "double";
+  } else if constexpr (std::is_same_v<S, long double>) {
+    return "long double";
+  } else {
+    return "custom";
+  }
+}
+
+/// A number as JSON, with all digits.
+[[nodiscard]] inline std::string number(double x) {
+  std::array<char, 32> text{};
+  const int length = std::snprintf(text.data(), text.size(), "%.17g", x);
+  return {text.data(), static_cast<std::size_t>(length)};
+}
+
+template <class Scene>
+[[nodiscard]] std::string columns_json() {
+  using Group = typename Scene::Group;
+  constexpr std::size_t rotations = Space<Group>::rotations;
+  JsonList list;
+  const auto add = [&](std::string_view name, std::string_view unit, std::string_view frame,
+                       std::string_view body) {
+    list.add("{\"name\": " + json_string(name) + ", \"unit\": " + json_string(unit) +
+             ", \"frame\": " + json_string(frame) + ", \"body\": " + json_string(body) + '}');
+  };
+  const auto momentum_unit = [](std::size_t k) { return k < rotations ? "kg m^2/s" : "kg m/s"; };
+  add("t", "s", "", "");
+  for (const std::string_view body : Scene::bodies) {
+    const std::string name(body);
+    for (const std::string_view blade : Group::template Element<typename Scene::Scalar>::names) {
+      add(name + ".motor." + std::string(blade), is_ideal(blade) ? "m" : "1", "body to world",
+          body);
+    }
+    for (std::size_t k = 0; k < Group::generators.size(); ++k) {
+      add(name + ".momentum." + std::string(Group::generators[k]), momentum_unit(k), "body", body);
+    }
+    for (std::size_t k = 0; k < position_size<Scene>; ++k) {
+      add(name + ".position." + "xyz"[k], "m", "world", body);
+    }
+  }
+  add("energy", "J", "", "");
+  for (std::size_t k = 0; k < Group::generators.size(); ++k) {
+    add("spatial_momentum." + std::string(Group::generators[k]), momentum_unit(k), "world", "");
+  }
+  for (const auto& conserved : Scene::conserved) {
+    if (!has_own_column(conserved)) continue;
+    const bool momentum = conserved.quantity == Quantity::spatial_momentum;
+    add(conserved.name, conserved.unit, momentum ? "world" : "body",
+        momentum ? std::string_view{} : Scene::bodies[conserved.body]);
+  }
+  return list.text();
+}
+
+template <class Scene>
+[[nodiscard]] std::string conserved_json() {
+  JsonList list;
+  for (const auto& conserved : Scene::conserved) {
+    JsonList norm;
+    for (const std::string_view column : conserved.norm) {
+      if (!column.empty()) norm.add(json_string(column));
+    }
+    list.add("{\"name\": " + json_string(conserved.name) +
+             ", \"column\": " + json_string(conserved.name) + ", \"norm\": " + norm.text() +
+             ", \"scale\": " + number(conserved.scale) +
+             ", \"description\": " + json_string(conserved.description) + '}');
+  }
+  return list.text();
+}
+
+template <class Methods>
+struct MethodTable;
+
+/// The methods a scene can be run with: their names, and one run of whichever is chosen.
+template <class... Method>
+struct MethodTable<std::tuple<Method...>> {
+  [[nodiscard]] static std::string json() {
+    JsonList list;
+    (list.add("{\"name\": " + json_string(Method::name) +
+              ", \"order\": " + std::to_string(Method::order) + '}'),
+     ...);
+    return list.text();
+  }
+  using AnyOf = std::variant<Method...>;
+
+  /// Sets `method` to the one called `name`; false if there is none.
+  [[nodiscard]] static bool choose(std::string_view name, AnyOf& method) {
+    return ((Method::name == name ? (method.template emplace<Method>(), true) : false) || ...);
+  }
+};
+
+template <class Scene>
+using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>>;
+
+/// The JSON of `hamotor_describe`.
+template <SceneDefinition Scene>
+[[nodiscard]] std::string description() {
+  using Group = typename Scene::Group;
+  return "{\"abi\": 1, \"scene\": " + json_string(Scene::name) +
+         ", \"algebra\": " + json_string(Group::algebra) +
+         ", \"group\": " + json_string(Group::name) +
+         ", \"scalar\": " + json_string(scalar_name<typename Scene::Scalar>()) +
+         ", \"kernels\": " + json_string(Scene::kernels) +
+         ", \"compiler\": " + json_string(compiler()) +
+         ", \"fma\": " + (has_fused_multiply_add ? "true" : "false") +
+         ",\n \"bodies\": " + json_strings(Scene::bodies) +
+         ",\n \"methods\": " + MethodsOf<Scene>::json() +
+         ",\n \"motor\": " + json_strings(Group::template Element<typename Scene::Scalar>::names) +
+         ",\n \"momentum\": " + json_strings(Group::generators) +
+         ",\n \"columns\": " + columns_json<Scene>() +
+         ",\n \"conserved\": " + conserved_json<Scene>() + "}\n";
+}
+
+/// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
+template <class G, std::size_t N, class S>
+[[nodiscard]] constexpr bool is_finite(const State<G, N, S>& state) noexcept {
+  S sum(0);
+  for (std::size_t i = 0; i < N; ++i) {
+    S part(0);
+    for (const S& x : state.motors[i].components()) part = mul_add(S(0), x, part);
+    for (const S& x : state.momenta[i].components()) sum = mul_add(S(0), x, sum);
+    sum = sum + part;
+  }
+  return sum == S(0);
+}
+
+/// A scene under way.
+template <SceneDefinition Scene>
+class Run {
+  using System = SystemOf<Scene>;
+  using S = typename Scene::Scalar;
+  using G = typename Scene::Group;
+  using Motor = typename G::template Element<S>;
+  using Momentum = typename G::template Momentum<S>;
+  using Point = typename Space<G>::template Point<S>;
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  /// Starts from `state`, user's body frames.
+  Run(const typename MethodsOf<Scene>::AnyOf& method, double time, double step,
+      const double* state) noexcept
+      : method_(method), time_(S(time)), step_(S(step)) {
+    for (std::size_t i = 0; i < n; ++i) {
+      const Motor motor = Motor::from(read<motor_size<Scene>>(state));
+      const Momentum momentum = Momentum::from(read<momentum_size<Scene>>(state));
+      state_.motors[i] = gp(motor, Scene::frames[i]);
+      state_.momenta[i] = Ad_star(Scene::frames[i], momentum);
+    }
+  }
+
+  /// Up to `steps` steps; a row after each whose index is a multiple of `every`.  Returns the steps
+  /// done: fewer mean that a number became non-finite, and the state is the last finite one.
+  [[nodiscard]] std::int64_t advance(std::int64_t steps, std::int64_t every,
+                                     double* rows) noexcept {
+    return std::visit([&](auto& method) { return advance_with(method, steps, every, rows); },
+                      method_);
+  }
+
+  /// One row of columns.
+  void observe(double* row) const noexcept {
+    *row++ = static_cast<double>(now());
+    std::array<Momentum, n> spatial{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Motor motor = user_motor(i);
+      row = write(motor.components(), row);
+      row = write(user_momentum(i).components(), row);
+      row = write(position(i, motor), row);
+      spatial[i] = Ad_star_inverse(state_.motors[i], state_.momenta[i]);
+    }
+    for (std::size_t i = 1; i < n; ++i) spatial[0] = spatial[0] + spatial[i];
+    const auto total = spatial[0].components();
+    const S energy = Scene::system.energy(state_);
+    *row++ = static_cast<double>(energy);
+    row = write(total, row);
+    for (const auto& conserved : Scene::conserved) {
+      if (!has_own_column(conserved)) continue;
+      *row++ = static_cast<double>(conserved.quantity == Quantity::spatial_momentum
+                                       ? combination(conserved.coefficients, total)
+                                       : casimir(conserved.quantity, conserved.body));
+    }
+  }
+
+  /// The state in the user's body frames.
+  void read_state(double* state) const noexcept {
+    for (std::size_t i = 0; i < n; ++i) {
+      state = write(user_motor(i).components(), state);
+      state = write(user_momentum(i).components(), state);
+    }
+  }
+
+  [[nodiscard]] const Drift<S>& drift() const noexcept { return drift_; }
+
+ private:
+  template <class Method>
+  [[nodiscard]] std::int64_t advance_with(Method& method, std::int64_t steps, std::int64_t every,
+                                          double* rows) noexcept {
+    if (failed_) return 0;
+    StateOf<System> state = state_;
+    for (std::int64_t done = 0; done < steps; ++done) {
+      method.do_step(Scene::system, state, now(), step_);
+      if (!is_finite(state)) {
+        failed_ = true;
+        return done;
+      }
+      state_ = state;
+      drift_ = method.drift();
+      ++index_;
+      if (rows != nullptr && every > 0 && index_ % every == 0) {
+        observe(rows);
+        rows += columns<Scene>();
+      }
+    }
+    return steps;
+  }
+
+  [[nodiscard]] S now() const noexcept { return mul_add(static_cast<S>(index_), step_, time_); }
+
+  [[nodiscard]] Motor user_motor(std::size_t i) const noexcept {
+    return gp(state_.motors[i], reverse(Scene::frames[i]));
+  }
+
+  [[nodiscard]] Momentum user_momentum(std::size_t i) const noexcept {
+    return Ad_star_inverse(Scene::frames[i], state_.momenta[i]);
+  }
+
+  [[nodiscard]] static auto position(std::size_t i, const Motor& motor) noexcept {
+    if constexpr (Space<G>::translates) {
+      return sandwich(motor, typename Space<G>::template Origin<S>{}).components();
+    } else {
+      std::array<S, position_size<Scene>> where{};
+      Scene::system.for_each_body([&](auto k, const auto& body) {
+        if (k == i) where = body.fixed_point();
+      });
+      return where;
+    }
+  }
+
+  [[nodiscard]] static S combination(const std::array<double, momentum_size<Scene>>& coefficients,
+                                     const std::array<S, momentum_size<Scene>>& total) noexcept {
+    S sum(0);
+    for (std::size_t k = 0; k < total.size(); ++k) {
+      if (coefficients[k] != 0) sum = mul_add(S(coefficients[k]), total[k], sum);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] S casimir(Quantity quantity, std::size_t i) const noexcept {
+    constexpr std::size_t rotations = Space<G>::rotations;
+    const auto mu = state_.momenta[i].components();
+    const auto pi = detail::first<rotations>(mu);
+    if (quantity == Quantity::pi_squared) return detail::dot(pi, pi);
+    if constexpr (Space<G>::translates) {
+      const auto p = detail::rest<rotations>(mu);
+      if (quantity == Quantity::p_squared) return detail::dot(p, p);
+      if constexpr (rotations == 3) {
+        if (quantity == Quantity::p_dot_pi) return detail::dot(p, pi);
+      }
+    }
+    return std::numeric_limits<S>::quiet_NaN();
+  }
+
+  template <std::size_t size>
+  [[nodiscard]] static std::array<S, size> read(const double*& from) noexcept {
+    std::array<S, size> result{};
+    for (S& x : result) x = static_cast<S>(*from++);
+    return result;
+  }
+
+  template <std::size_t size>
+  [[nodiscard]] static double* write(const std::array<S, size>& values, double* to) noexcept {
+    for (const S& x : values) *to++ = static_cast<double>(x);
+    return to;
+  }
+
+  typename MethodsOf<Scene>::AnyOf method_;
+  S time_;
+  S step_;
+  StateOf<System> state_{};
+  Drift<S> drift_;
+  std::int64_t index_ = 0;
+  bool failed_ = false;
+};
+
+/// `hamotor_start`: NULL for an unknown method, or without memory.
+template <SceneDefinition Scene>
+[[nodiscard]] void* start(const char* method, double time, double step,
+                          const double* state) noexcept {
+  typename MethodsOf<Scene>::AnyOf chosen;
+  if (method == nullptr || !MethodsOf<Scene>::choose(method, chosen)) return nullptr;
+  return new (std::nothrow) Run<Scene>(chosen, time, step, state);
+}
+
+}  // namespace scene
+}  // namespace hamotor
+
+#if defined(_WIN32)
+#define HAMOTOR_SCENE_EXPORT extern "C" __declspec(dllexport)
+#else
+#define HAMOTOR_SCENE_EXPORT extern "C" __attribute__((visibility("default")))
+#endif
+
+/// Defines the C functions of the compiled scene `Scene`; once in a shared library.
+#define HAMOTOR_SCENE(Scene)                                                             \
+  HAMOTOR_SCENE_EXPORT const char* hamotor_describe() {                                  \
+    static const std::string text = hamotor::scene::description<Scene>();                \
+    return text.c_str();                                                                 \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void* hamotor_start(const char* method, double time, double step, \
+                                           const double* state) {                        \
+    return hamotor::scene::start<Scene>(method, time, step, state);                      \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT std::int64_t hamotor_advance(void* run, std::int64_t steps,       \
+                                                    std::int64_t every, double* rows) {  \
+    return static_cast<hamotor::scene::Run<Scene>*>(run)->advance(steps, every, rows);   \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {              \
+    static_cast<const hamotor::scene::Run<Scene>*>(run)->observe(row);                   \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {              \
+    static_cast<const hamotor::scene::Run<Scene>*>(run)->read_state(state);              \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void hamotor_drift(const void* run, double* drift) {              \
+    const auto& so_far = static_cast<const hamotor::scene::Run<Scene>*>(run)->drift();   \
+    drift[0] = static_cast<double>(so_far.largest);                                      \
+    drift[1] = static_cast<double>(so_far.sum);                                          \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void hamotor_stop(void* run) {                                    \
+    delete static_cast<hamotor::scene::Run<Scene>*>(run);                                \
+  }                                                                                      \
+  static_assert(hamotor::SceneDefinition<Scene>)

@@ -1,0 +1,270 @@
+// One-step methods on G × g*, generic over groups and systems.
+//
+// A step allocates nothing and throws nothing.  A stepper is a value: copy it with its state to
+// branch a run, make a new one for another system.  Every step ends with a projection back to the
+// group, and what it had to correct is kept, so that it cannot hide an error.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <tuple>
+
+#include "hamotor/scalar.hpp"
+#include "hamotor/space.hpp"
+#include "hamotor/state.hpp"
+
+namespace hamotor {
+
+/// Whether a sum over steps carries the digits that each addition would lose.
+enum class Summation { plain, compensated };
+
+namespace detail {
+
+/// Adds `change` to `value`; `low` holds what does not fit (Neumaier 1974), so that a rounding
+/// error is made in the change only.  `correct(value)` is added to the sum as well.
+template <class T, class Correct>
+constexpr void add_compensated(T& value, T& low, const T& change, Correct&& correct) noexcept {
+  auto sum = value.components();
+  auto lost = low.components();
+  const auto add = change.components();
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    const auto pair = scalar::two_sum(sum[k], add[k] + lost[k]);
+    sum[k] = pair.hi;
+    lost[k] = pair.lo;
+  }
+  const auto correction = correct(T::from(sum)).components();
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    const auto pair = scalar::two_sum(sum[k], lost[k] + correction[k]);
+    sum[k] = pair.hi;
+    lost[k] = pair.lo;
+  }
+  value = T::from(sum);
+  low = T::from(lost);
+}
+
+template <class T>
+constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
+  auto sum = value.components();
+  auto lost = low.components();
+  const auto add = change.components();
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    const auto pair = scalar::two_sum(sum[k], add[k] + lost[k]);
+    sum[k] = pair.hi;
+    lost[k] = pair.lo;
+  }
+  value = T::from(sum);
+  low = T::from(lost);
+}
+
+/// Largest absolute coefficient of M M~ − 1.
+template <class S>
+[[nodiscard]] constexpr S size(const UnitDefect<S>& defect) noexcept {
+  return scalar::max_abs(defect.scalar, defect.pseudoscalar);
+}
+
+template <class S>
+constexpr void record(Drift<S>& drift, const S& defect) noexcept {
+  drift.largest = select(defect > drift.largest, defect, drift.largest);
+  drift.sum = drift.sum + defect;
+}
+
+/// The series of dexp⁻¹ for M = M₀ exp X, Ṁ = M B: Ẋ = B + ½ [X, B] + 1/12 [X, [X, B]] − …, whose
+/// next term is of fourth order in X.
+template <class Rate, class S>
+[[nodiscard]] constexpr Rate dexp_inverse(const Rate& x, const Rate& b, const S& half) noexcept {
+  const Rate once = ad(x, b);
+  return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
+}
+
+}  // namespace detail
+
+/// Runge–Kutta–Munthe-Kaas method of order 4: the classical Runge–Kutta method for X in
+/// M = M₀ exp X and for μ (Munthe-Kaas 1998; Iserles, Munthe-Kaas, Nørsett & Zanna 2000).
+/// Four evaluations of rate and forque a step; not symplectic.
+template <HamiltonianSystem System>
+class Rkmk4 {
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Rate = typename G::template Rate<S>;
+  using Momentum = typename G::template Momentum<S>;
+  static constexpr std::size_t n = System::bodies;
+  using Rates = std::array<Rate, n>;
+  using Momenta = std::array<Momentum, n>;
+
+ public:
+  static constexpr int order = 4;
+  static constexpr std::string_view name = "rkmk4";
+
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& /*t*/,
+                         const S& h) noexcept {
+    const S half_step = S(0.5) * h;
+    const Slope one = slope(system, state, Rates{});
+    const Slope two = slope_at(system, state, half_step, one);
+    const Slope three = slope_at(system, state, half_step, two);
+    const Slope four = slope_at(system, state, h, three);
+
+    S worst(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Rate x =
+          (h / S(6)) * mul_add(S(2), two.rate[i] + three.rate[i], one.rate[i] + four.rate[i]);
+      const Momentum force =
+          mul_add(S(2), two.force[i] + three.force[i], one.force[i] + four.force[i]);
+      auto& motor = state.motors[i];
+      motor = gp(motor, exp(x));
+      const auto defect = Space<G>::unit_defect(motor);
+      worst = scalar::max_abs(worst, detail::size(defect));
+      motor = motor + Space<G>::unit_correction(motor, defect);
+      state.momenta[i] = mul_add(h / S(6), force, state.momenta[i]);
+    }
+    detail::record(drift_, worst);
+  }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+ private:
+  /// Ẋ and μ̇.
+  struct Slope {
+    Rates rate;
+    Momenta force;
+  };
+
+  /// At the state, in the coordinate X.
+  [[nodiscard]] static constexpr Slope slope(const System& system, const StateOf<System>& state,
+                                             const Rates& x) noexcept {
+    Slope result{system.rate(state), {}};
+    for (std::size_t i = 0; i < n; ++i) {
+      result.force[i] = coadjoint(result.rate[i], state.momenta[i]);
+      result.rate[i] = detail::dexp_inverse(x[i], result.rate[i], S(0.5));
+    }
+    if constexpr (System::has_forque) {
+      const auto forque = system.forque(state.motors);
+      for (std::size_t i = 0; i < n; ++i) result.force[i] = result.force[i] - forque[i];
+    }
+    return result;
+  }
+
+  /// At the time h after `state` if `before` were the slope in between.
+  [[nodiscard]] static constexpr Slope slope_at(const System& system, const StateOf<System>& state,
+                                                const S& h, const Slope& before) noexcept {
+    StateOf<System> there = state;
+    Rates x{};
+    for (std::size_t i = 0; i < n; ++i) {
+      x[i] = h * before.rate[i];
+      there.momenta[i] = mul_add(h, before.force[i], state.momenta[i]);
+      if constexpr (System::has_forque) there.motors[i] = gp(state.motors[i], exp(x[i]));
+    }
+    return slope(system, there, x);
+  }
+
+  Drift<S> drift_;
+};
+
+/// Strang splitting, order 2, symmetric and symplectic: half a kick, the free motion, half a kick,
+/// where the free motion is itself exact or a symmetric composition of exact flows.
+///
+/// Every part is a coadjoint motion or a kick: Casimirs of free bodies and the spatial momentum are
+/// constant but for rounding, whatever the step, and the energy error is bounded.  With compensated
+/// sums a rounding error is relative to the change in a step instead of to the state.  The forque
+/// at the end of a step is kept for the start of the next: one evaluation a step.
+template <SplitSystem System, Summation summation = Summation::compensated>
+class Splitting2 {
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Motors = decltype(StateOf<System>::motors);
+  using Momenta = decltype(StateOf<System>::momenta);
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  static constexpr int order = 2;
+  static constexpr std::string_view name = "splitting2";
+
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& /*t*/,
+                         const S& h) noexcept {
+    if constexpr (System::has_forque) {
+      if (!(known_.at == state.motors && known_.any)) know_forque(system, state.motors);
+      const S half = S(-0.5) * h;
+      Momenta kicked{};
+      for (std::size_t i = 0; i < n; ++i) {
+        kicked[i] = mul_add(half, known_.forque[i], state.momenta[i]);
+      }
+      auto change = system.free_change(state.motors, kicked, h);
+      for (std::size_t i = 0; i < n; ++i) {
+        change.momenta[i] = mul_add(half, known_.forque[i], change.momenta[i]);
+      }
+      move(state.motors, change.motors);
+      know_forque(system, state.motors);
+      for (std::size_t i = 0; i < n; ++i) {
+        change.momenta[i] = mul_add(half, known_.forque[i], change.momenta[i]);
+      }
+      push(state.momenta, change.momenta);
+    } else {
+      const auto change = system.free_change(state.motors, state.momenta, h);
+      move(state.motors, change.motors);
+      push(state.momenta, change.momenta);
+    }
+  }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+ private:
+  struct Nothing {};
+  struct KnownForque {
+    bool any = false;
+    Motors at{};
+    Momenta forque{};
+  };
+  struct LowDigits {
+    Motors motors{};
+    Momenta momenta{};
+  };
+  static constexpr bool compensated = summation == Summation::compensated;
+
+  constexpr void know_forque(const System& system, const Motors& motors) noexcept {
+    known_.any = true;
+    known_.at = motors;
+    known_.forque = system.forque(motors);
+  }
+
+  constexpr void move(Motors& motors, const Motors& change) noexcept {
+    S worst(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto correction = [&](const auto& motor) {
+        const auto defect = Space<G>::unit_defect(motor);
+        worst = scalar::max_abs(worst, detail::size(defect));
+        return Space<G>::unit_correction(motor, defect);
+      };
+      if constexpr (compensated) {
+        detail::add_compensated(motors[i], low_.motors[i], change[i], correction);
+      } else {
+        motors[i] = motors[i] + change[i];
+        motors[i] = motors[i] + correction(motors[i]);
+      }
+    }
+    detail::record(drift_, worst);
+  }
+
+  constexpr void push(Momenta& momenta, const Momenta& change) noexcept {
+    for (std::size_t i = 0; i < n; ++i) {
+      if constexpr (compensated) {
+        detail::add_compensated(momenta[i], low_.momenta[i], change[i]);
+      } else {
+        momenta[i] = momenta[i] + change[i];
+      }
+    }
+  }
+
+  [[no_unique_address]] std::conditional_t<System::has_forque, KnownForque, Nothing> known_;
+  [[no_unique_address]] std::conditional_t<compensated, LowDigits, Nothing> low_;
+  Drift<S> drift_;
+};
+
+/// The steppers that a system can be stepped with.
+template <class System>
+using SteppersOf = std::tuple<Rkmk4<System>, Splitting2<System>>;
+
+}  // namespace hamotor
