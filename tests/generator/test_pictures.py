@@ -109,9 +109,11 @@ def test_the_axis_of_errors_is_logarithmic_and_reaches_rounding() -> None:
     assert axes.get_xlabel() == "time (s)"
 
 
-def test_an_error_that_is_always_zero_says_so_in_the_legend() -> None:
-    figure = draw_conserved(account({}, {"q": conserved()}), T, {"q": 0 * T})
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["q: exactly 0"]
+def test_quantities_without_any_error_are_named_below() -> None:
+    quantities = {"q": conserved(), "p": {**conserved(), "column": "p"}}
+    figure = draw_conserved(account({}, quantities), T, {"q": 0 * T, "p": 1e-9 * T})
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["p"]
+    assert figure.legends[0].get_title().get_text() == "without any error: q"
 
 
 def test_an_absolute_error_is_dashed_and_has_its_unit() -> None:

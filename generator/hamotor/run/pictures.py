@@ -6,6 +6,7 @@ Colours are Okabe and Ito's, which colour-blind readers can tell apart.
 from __future__ import annotations
 
 import os
+import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -33,7 +34,9 @@ _DPI = 150
 _TRIADS = 12
 _SPHERES_DRAWN = 3
 _COARSE_TURN = 0.35  # radians between rows: a line would cut through the sphere, dots do not lie
+_CROWDED = 100.0  # radians of trace on one sphere
 _FLOOR = 1e-17
+_NOISE = 1e-13
 _EPSILON = float(np.finfo(float).eps)
 
 
@@ -81,9 +84,9 @@ def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
         left=0.85 / (5.2 * panels + 1.2),
         right=1 - 0.35 / (5.2 * panels + 1.2),
         bottom=0.125,
-        top=0.86,
+        top=0.875,
         wspace=0.22,
-        hspace=0.08,
+        hspace=0.1,
     )
     _title(figure, report)
     column = 0
@@ -111,15 +114,23 @@ def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
             axes.plot(table["t"], values, style, color=_body_colour(number), linewidth=1.0)
     axes.set(xlabel="time (s)", ylabel="position (m)")
     handles = [Line2D([], [], color=_BLACK, linestyle=style, linewidth=1.0) for style in styles]
-    axes.legend(handles, "xyz", loc="upper right", ncols=3, fontsize=8, framealpha=0.7)
+    axes.legend(
+        handles,
+        "xyz",
+        loc="lower right",
+        bbox_to_anchor=(1, 1),
+        ncols=3,
+        fontsize=8,
+        frameon=False,
+    )
     _quiet_grid(axes)
 
 
 def _draw_turning(axes: Axes, t: Array, rotation: Array) -> None:
-    mark, size = (".", 1.5) if _is_coarse(rotation[:, :, 0]) else ("-", 1.0)
     for axis, colour in enumerate(_AXIS_COLOURS):
         cosine = rotation[:, :, axis] @ rotation[0, :, axis]
-        axes.plot(t, cosine, mark, color=colour, linewidth=1.0, markersize=size, alpha=0.85)
+        mark = "." if _is_coarse(rotation[:, :, axis]) else "-"
+        axes.plot(t, cosine, mark, color=colour, linewidth=1.0, markersize=1.5, alpha=0.85)
     axes.set(xlabel="time (s)", ylabel="cos of the angle turned", ylim=(-1.08, 1.08))
     _quiet_grid(axes)
 
@@ -179,7 +190,8 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
         if _is_coarse(tips):
             axes.plot(*tips.T, ".", color=colour, markersize=1.2, alpha=0.5)
         else:
-            axes.plot(*tips.T, color=colour, linewidth=0.9, alpha=0.8)
+            width, alpha = (0.5, 0.6) if _arc_length(tips) > _CROWDED else (0.9, 0.8)
+            axes.plot(*tips.T, color=colour, linewidth=width, alpha=alpha)
         axes.plot(*np.stack([0 * tips[-1], tips[-1]]).T, color=colour, linewidth=2.2)
         axes.scatter(*tips[:1].T, color=colour, marker="o", s=30, depthshade=False)
         axes.scatter(*tips[-1:].T, color=colour, marker="s", s=30, depthshade=False)
@@ -190,7 +202,7 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_axis_off()
     axes.set_title(f"attitude of {body}\ntraces of its axes on the unit sphere", fontsize=10)
-    axes.set_box_aspect((1, 1, 1), zoom=1.25)
+    axes.set_box_aspect((1, 1, 1), zoom=1.27)
 
 
 def _legend(figure: Figure, bodies: Sequence[str], axes: int = 3) -> None:
@@ -263,17 +275,23 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
     _title(figure, report, "what must stay constant")
     axes: Axes = figure.add_subplot(1, 1, 1)
     smallest, largest = _EPSILON, _EPSILON
-    for number, (name, said) in enumerate(report["conserved"].items()):
-        scale = said["scale"] or 1.0
-        error = swings[said["column"]] / scale
-        colour = _LINE_COLOURS[number % len(_LINE_COLOURS)]
-        style = "-" if said["scale"] else "--"
-        label = name if said["scale"] else f"{name} (absolute, {said['unit']})"
+    exact = []
+    for name, said in report["conserved"].items():
+        error = swings[said["column"]] / (said["scale"] or 1.0)
         if not error.any():
-            axes.plot([], [], style, color=colour, label=f"{label}: exactly 0")
+            exact.append(name)
             continue
+        # What is only rounding noise stays in the background.
+        noise = bool(error.max() < _NOISE)
         axes.plot(
-            t, np.maximum(error, _FLOOR), style, color=colour, linewidth=1.1, alpha=0.9, label=label
+            t,
+            np.maximum(error, _FLOOR),
+            "-" if said["scale"] else "--",
+            color=_LINE_COLOURS[len(axes.lines) % len(_LINE_COLOURS)],
+            linewidth=0.6 if noise else 1.2,
+            alpha=0.7 if noise else 0.95,
+            zorder=2 if noise else 3,
+            label=name if said["scale"] else f"{name} (absolute, {said['unit']})",
         )
         positive = error[error > 0]
         smallest, largest = min(smallest, positive.min()), max(largest, positive.max())
@@ -287,6 +305,8 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
         ha="right",
         fontsize=8,
         color=_GREY,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
+        zorder=4,
     )
     axes.set_yscale("log")
     bottom = max(_FLOOR, 10.0 ** np.floor(np.log10(smallest)))
@@ -297,13 +317,19 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
         ylabel="relative error |Q(t) − Q(0)| / |Q(0)|",
     )
     _quiet_grid(axes)
-    if report["conserved"]:
-        figure.legend(
-            loc="outside lower center",
-            ncols=3 if len(report["conserved"]) > 4 else 2,
-            frameon=False,
-            fontsize=8.5,
-        )
+    handles = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
+    legend = figure.legend(
+        handles,
+        [str(line.get_label()) for line in handles],
+        loc="outside lower center",
+        ncols=3,
+        frameon=False,
+        fontsize=8.5,
+        title=textwrap.fill("without any error: " + ", ".join(exact), 105) if exact else None,
+        title_fontsize=8.5,
+    )
+    for line in legend.get_lines():
+        line.set(linewidth=2, alpha=1)
     return figure
 
 
@@ -357,3 +383,7 @@ def _is_coarse(tips: Array) -> bool:
     if len(tips) < 3:
         return True
     return float(np.median(np.linalg.norm(np.diff(tips, axis=0), axis=1))) > _COARSE_TURN
+
+
+def _arc_length(tips: Array) -> float:
+    return float(np.linalg.norm(np.diff(tips, axis=0), axis=1).sum())

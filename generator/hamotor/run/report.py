@@ -59,7 +59,7 @@ def report(
         "every": plan.every,
         "rows": outcome.rows,
         "t_end": float(outcome.final[0]),
-        "scalar": description.scalar,
+        "scalar": description.scalar.replace(" ", "_"),
         "kernels": description.kernels,
         "representation": origin.representation,
         "status": outcome.status,
