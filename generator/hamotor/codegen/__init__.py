@@ -8,9 +8,27 @@ from pathlib import Path
 from hamotor.codegen import tree
 from hamotor.codegen.compiler import SourceFile, compile_algebra
 from hamotor.codegen.show import show, table
-from hamotor.codegen.spec import AlgebraSpec, bundled_algebras, bundled_path, read_algebra
+from hamotor.codegen.spec import (
+    AlgebraSpec,
+    bundled_algebras,
+    bundled_path,
+    parse_algebra,
+    read_algebra,
+)
+from hamotor.codegen.standalone import standalone_files
+from hamotor.codegen.starter import starter_spec
+from hamotor.errors import UsageError
 
-__all__ = ["bundled_algebras", "generate", "read_algebra", "show", "source_files", "table"]
+__all__ = [
+    "bundled_algebras",
+    "generate",
+    "generate_library",
+    "read_algebra",
+    "show",
+    "source_files",
+    "starter_spec",
+    "table",
+]
 
 
 def source_files(specs: Sequence[AlgebraSpec]) -> tuple[SourceFile, ...]:
@@ -33,3 +51,24 @@ def generate(
     folder = out or tree.GENERATED
     owned = ["."] if not names and out is None else [f"hamotor/{name}" for name in chosen]
     return (tree.differences if check else tree.write)(files, folder, owned)
+
+
+def generate_library(
+    spec_text: str, file: str, out: Path, *, check: bool = False
+) -> list[tree.Difference]:
+    """Write the library of any spec as a folder of its own: headers, CMake target, test.
+
+    file: what the spec is called in messages.  out: the folder; a folder that holds anything but an
+    earlier library of the same algebra is refused.  check: write nothing.
+    Returns how the folder differed.  Raises UsageError for a spec with an error in it.
+    """
+    spec = parse_algebra(spec_text, file)
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: is not a folder")
+    marker = out / f"{spec.name}.toml"
+    if out.is_dir() and any(out.iterdir()) and not marker.is_file():
+        raise UsageError(
+            f"{out}: holds files that are not a library of {spec.name}; name an empty folder"
+        )
+    files = tree.formatted(standalone_files(spec, spec_text))
+    return (tree.differences if check else tree.write)(files, out, ["include/hamotor", "test"])

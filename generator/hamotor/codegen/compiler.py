@@ -61,7 +61,7 @@ def compile_algebra(spec: AlgebraSpec) -> tuple[SourceFile, ...]:
     files.append(
         SourceFile(
             f"{folder}/{spec.name}.hpp",
-            _render("umbrella.hpp.jinja", banner=banner, includes=includes),
+            render("umbrella.hpp.jinja", banner=banner, includes=includes),
         )
     )
     files.append(SourceFile(f"{folder}/kernels.json", _index(spec, kernels)))
@@ -80,7 +80,8 @@ def _environment() -> Environment:
     )
 
 
-def _render(template: str, **values: Any) -> str:
+def render(template: str, **values: Any) -> str:
+    """The text of a template with these values; a missing value is an error."""
     return _environment().get_template(template).render(**values)
 
 
@@ -149,7 +150,7 @@ def _element_data(algebra: Algebra, element: Element) -> dict[str, Any]:
 
 def _elements_file(spec: AlgebraSpec, folder: str, elements: Sequence[Element]) -> SourceFile:
     template = "elements.hpp.jinja"
-    text = _render(
+    text = render(
         template,
         banner=_banner(spec, template, "Element types: aggregates whose members are blades."),
         namespace=f"hamotor::{spec.name}",
@@ -193,7 +194,7 @@ def _kernels_file(
     template = "kernels.hpp.jinja"
     needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
     includes = [*includes, *(RUNTIME_HEADERS[f] for f in sorted(needed) if f in RUNTIME_HEADERS)]
-    text = _render(
+    text = render(
         template,
         banner=_banner(spec, template, "Kernels: unrolled, sparse, for any scalar type S."),
         namespace=f"hamotor::{spec.name}" + (f"::{namespace}" if namespace else ""),
@@ -210,7 +211,7 @@ def _group_files(
     file = group.rate.namespace
     template = "elements.hpp.jinja"
     what = f"Rates and momenta of {group.name}, in physical coordinates of the body frame."
-    elements = _render(
+    elements = render(
         template,
         banner=_banner(spec, template, what),
         namespace=f"hamotor::{spec.name}::{file}",
@@ -223,7 +224,7 @@ def _group_files(
             f"{generator.momentum}: {multivector_text(spec.algebra, dual.embedding)}"
         )
     template = "group.hpp.jinja"
-    tag = _render(
+    tag = render(
         template,
         banner=_banner(spec, template, f"The group {group.name}."),
         namespace=f"hamotor::{spec.name}",

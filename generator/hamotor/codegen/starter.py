@@ -214,8 +214,8 @@ def _kernels(basis: Sequence[str], wanted: Sequence[str]) -> list[str]:
 
 def _group(basis: Sequence[str]) -> list[str]:
     lines = [
-        "# The group of all even unit versors.  A subgroup is a shorter list of generators that must",
-        "# close under the bracket.  Rates and momenta are coordinates over the generators.",
+        "# The group of all even unit versors.  A subgroup has fewer generators, closed under the",
+        "# bracket.  Rates and momenta are coordinates over the generators.",
         "[[group]]",
         'name = "Spin"',
         'description = "all rotations and boosts"',
