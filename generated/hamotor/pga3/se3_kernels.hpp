@@ -193,10 +193,10 @@ template <class S>
   const S q_e02 = q_scale * m.e02;
   const S q_e03 = q_scale * m.e03;
   const S q_unscale = S(1) / q_scale;
-  const auto dot = scalar::compensated_dot_pair(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01);
-  const auto share = scalar::double_word_ratio(dot, squares);
+  const auto overlap = scalar::compensated_dot_pair(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01);
+  const auto share = scalar::double_word_ratio(overlap, squares);
   const S pitch =
-      dot(sine, q_scale * m.e0123, m.s, dot.hi * inverse_sine) / dot(sine, sine, m.s, m.s);
+      dot(sine, q_scale * m.e0123, m.s, overlap.hi * inverse_sine) / dot(sine, sine, m.s, m.s);
   const S along = pitch * inverse_sine;
   const S q_length = scalar::sqrt(dot(q_e03, q_e03, q_e02, q_e02, q_e01, q_e01));
   const S half_turn_ratio = select(q_length > S(0), half_turn / q_length, S(0));

@@ -275,7 +275,7 @@ def log_kernel(
     if plane.pitch:
         vs_scale, vs = _scaled(writer, {v: m[v] for v in plane.translation}, "q", algebra)
         unscale = writer.let("q_unscale", Quotient(ONE, vs_scale))
-        dot = writer.let("dot", call("compensated_dot_pair", *_dot_terms(plane, ws, vs)))
+        dot = writer.let("overlap", call("compensated_dot_pair", *_dot_terms(plane, ws, vs)))
         writer.let("share", call("double_word_ratio", dot, squares))
         quad = _quadrivector(plane)
         pss = Product(vs_scale, m[quad])
@@ -283,7 +283,7 @@ def log_kernel(
         pitch = writer.let(
             "pitch",
             Quotient(
-                MultiplyAdd(scalar, Product(Name("dot.hi"), inverse), Product(sine, pss)), norm2
+                MultiplyAdd(scalar, Product(Name("overlap.hi"), inverse), Product(sine, pss)), norm2
             ),
         )
         along = writer.let("along", Product(pitch, inverse))
