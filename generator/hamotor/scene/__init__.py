@@ -7,6 +7,7 @@ from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.principal import PrincipalFrame
 from hamotor.scene.reading import bundled_scenes, parse_scene, read_scene
 from hamotor.scene.schema import METHODS, scene_reference, starter_scene
+from hamotor.scene.source import scene_source
 
 __all__ = [
     "GROUPS",
@@ -25,5 +26,6 @@ __all__ = [
     "parse_scene",
     "read_scene",
     "scene_reference",
+    "scene_source",
     "starter_scene",
 ]

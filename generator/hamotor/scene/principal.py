@@ -68,6 +68,7 @@ def principal_axes(tensor: NDArray[np.float64]) -> tuple[Vector, Vector]:
     if not off_diagonal.any():
         return tuple(float(x) for x in np.diag(tensor)), (1.0, 0.0, 0.0, 0.0)
     moments, vectors = np.linalg.eigh(tensor)
+    moments = _equal_where_rounding_parts_them(moments)
     order = max(
         itertools.permutations(range(3)),
         key=lambda columns: sum(abs(vectors[row, column]) for row, column in enumerate(columns)),
@@ -79,6 +80,15 @@ def principal_axes(tensor: NDArray[np.float64]) -> tuple[Vector, Vector]:
         axes[:, least_aligned] *= -1.0
     rotor = rotor_of_quaternion(quaternion_of_matrix(axes))
     return tuple(float(moments[k]) for k in order), rotor
+
+
+def _equal_where_rounding_parts_them(moments: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Ascending moments, equal ones exactly equal: a symmetric body gets the symmetric flow."""
+    equal = moments.copy()
+    for k in (1, 2):
+        if moments[k] - moments[k - 1] <= 8 * np.finfo(float).eps * moments[2]:
+            equal[k] = equal[k - 1]
+    return equal
 
 
 def principal_frame(

@@ -222,8 +222,8 @@ def _mass_distribution(table: Table) -> tuple[float, Vector, Matrix]:
     else:
         mass, center = table.number("mass"), table.vector("center_of_mass")
         tensor = _tensor(table, source, mass)
-    if moments := inertia.negative_moments(tensor):
-        table.fail(f"must be positive definite, but its principal moments are {moments}", source)
+    if negative := inertia.negative_moments(tensor):
+        table.fail(f"must be positive definite, but its principal moments are {negative}", source)
     if not table.flag("allow_unphysical_inertia") and (
         inequality := inertia.violated_inequality(tensor)
     ):
@@ -241,6 +241,13 @@ def _mass_distribution(table: Table) -> tuple[float, Vector, Matrix]:
         table.fail(
             f"the body has no moment of inertia about {where}, so that its momentum cannot tell"
             " how fast it turns; give it some thickness",
+            source,
+        )
+    moments = np.linalg.eigvalsh(np.array(about))
+    if moments[0] < schema.LARGEST**-3 or moments[-1] > schema.LARGEST**3:
+        table.fail(
+            f"the principal moments must lie within {schema.LARGEST**-3:g} and"
+            f" {schema.LARGEST**3:g}, so that nothing overflows",
             source,
         )
     return mass, center, tensor

@@ -14,7 +14,8 @@ from hamotor.scene.groups import ALGEBRAS, GROUPS, Group
 METHODS = ("auto", "rkmk4", "splitting2")
 NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]*"
 MOST_BODIES = 64
-MOST_INTERACTIONS = 1024
+MOST_INTERACTIONS = 128
+"""A scene of this size takes the compiler some ten seconds."""
 MOST_STEPS = 10**12
 MOST_BYTES = 1 << 20
 LARGEST = 1e36

@@ -1,0 +1,150 @@
+"""The C++ source of a scene: constants and types over the runtime, compiled to the C ABI."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from hamotor.errors import UsageError, suggest
+from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.model import Body, Scene
+
+TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
+KERNELS = ("generated",)
+SCALARS = {"double": "", "float": "F", "long_double": "L"}
+"""The scalar types a scene compiles for, with the suffix of their literals."""
+SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
+"""Masses and moments beyond these have products that overflow in single precision."""
+
+
+def scene_source(scene: Scene, kernels: str = "generated", scalar: str = "double") -> str:
+    """The text of the C++ file that defines `scene` over the runtime's headers.
+
+    Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
+    for numbers that do not fit the scalar.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    for what, value, allowed in (("kernels", kernels, KERNELS), ("scalar", scalar, tuple(SCALARS))):
+        if value not in allowed:
+            raise UsageError(
+                f'unknown {what} "{value}"; there is {", ".join(allowed)}.{suggest(value, allowed)}'
+            )
+    if scalar == "float":
+        _refuse_numbers_beyond_float(scene)
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    suffix = SCALARS[scalar]
+    return environment.get_template("scene.cpp.jinja").render(
+        scene=scene,
+        kernels=kernels,
+        scalar=scalar.replace("_", " "),
+        header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
+        bodies=[_body(body, suffix) for body in scene.bodies],
+        interactions=_interactions(scene, suffix),
+        conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
+    )
+
+
+def _refuse_numbers_beyond_float(scene: Scene) -> None:
+    for body in scene.bodies:
+        for what, x in [("mass", body.mass), *(("moment", x) for x in body.principal.moments)]:
+            if not SMALLEST_FLOAT <= x <= LARGEST_FLOAT:
+                raise UsageError(
+                    f'{scene.name}: body "{body.name}": the {what} {x:g} is too'
+                    f" {'large' if x > 1 else 'small'} for float; compile for double"
+                )
+
+
+def _literal(x: float, suffix: str) -> str:
+    """`x` as a C++ literal that reads back exactly; integers stay integers where they are short."""
+    if x == int(x) and abs(x) < 1e9:
+        return str(int(x))
+    return f"{x!r}{suffix}"
+
+
+def _literals(numbers: Sequence[float], suffix: str) -> str:
+    return ", ".join(_literal(x, suffix) for x in numbers)
+
+
+def _text(text: str) -> str:
+    """`text` as a C++ string literal."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _body(body: Body, suffix: str) -> dict[str, Any]:
+    frame = body.principal
+    arguments = [_literal(body.mass, suffix), f"{body.name}_moments"]
+    if not body.group.translates:
+        center = frame.from_body_frame(body.center_of_mass)
+        arguments += [f"{{{_literals(point, suffix)}}}" for point in (center, body.position)]
+    return {
+        "name": body.name,
+        "type": "FreeBody" if body.group.translates else "PivotedBody",
+        "moments": [_literal(x, suffix) for x in frame.moments],
+        "frame": _literals(frame.motor, suffix),
+        "arguments": arguments,
+    }
+
+
+def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
+    interactions = []
+    if scene.gravity is not None:
+        interactions.append(
+            {
+                "type": "UniformGravity<Group, Scalar>",
+                "members": [f".acceleration = {{{_literals(scene.gravity, suffix)}}}"],
+            }
+        )
+    number = {body.name: k for k, body in enumerate(scene.bodies)}
+
+    def attached(name: str, at: Sequence[float]) -> str:
+        return f"{{{_literals(scene.body_of[name].principal.from_body_frame(at), suffix)}}}"
+
+    for spring in scene.springs:
+        slack = "zero" if spring.rest_length == 0 else "positive"
+        common = f"Group, Scalar, hamotor::RestLength::{slack}"
+        near = attached(spring.body, spring.at)
+        if spring.other is None:
+            kind = f"SpringToWorld<{number[spring.body]}, {common}>"
+            ends = [f".at = {near}", f".anchor = {{{_literals(spring.anchor or (), suffix)}}}"]
+        else:
+            kind = f"SpringBetween<{number[spring.body]}, {number[spring.other]}, {common}>"
+            far = attached(spring.other, spring.other_at or ())
+            ends = [f".at_one = {near}", f".at_two = {far}"]
+        interactions.append(
+            {
+                "type": kind,
+                "members": [
+                    *ends,
+                    f".stiffness = {_literal(spring.stiffness, suffix)}",
+                    f".rest_length = {_literal(spring.rest_length, suffix)}",
+                ],
+            }
+        )
+    return interactions
+
+
+def _conserved(scene: Scene, quantity: ConservedQuantity) -> dict[str, Any]:
+    kind = quantity.name.rsplit(".", 1)[-1] if quantity.body else quantity.name.split(".", 1)[0]
+    coefficients = dict(quantity.coefficients)
+    names = [body.name for body in scene.bodies]
+    return {
+        "kind": kind,
+        "name": _text(quantity.name),
+        "unit": _text(quantity.unit),
+        "description": _text(quantity.description),
+        "body": names.index(quantity.body) if quantity.body else 0,
+        "coefficients": [_literal(coefficients.get(g, 0.0), "") for g in scene.group.generators]
+        if coefficients
+        else [],
+        "norm": [_text(column) for column in quantity.norm],
+        "scale": _literal(quantity.scale, ""),
+    }
