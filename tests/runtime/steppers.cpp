@@ -1,0 +1,360 @@
+// Laws of the steppers: order, reversibility, symplecticity, what they conserve, what they report.
+#include "hamotor/steppers.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "sample_systems.hpp"
+
+namespace {
+
+using hamotor::Rkmk4;
+using hamotor::Splitting2;
+using hamotor::Summation;
+using sample::distance;
+using sample::generic_state;
+using sample::spatial_momentum;
+
+template <class Method, class System>
+auto stepped(const System& system, hamotor::StateOf<System> state, double h, int steps) {
+  using S = typename System::Scalar;
+  Method method;
+  for (int k = 0; k < steps; ++k) method.do_step(system, state, S(k) * S(h), S(h));
+  return state;
+}
+
+/// Slope of log error over log step between two steps, against a reference of much finer steps.
+template <class Method, class System>
+double measured_order(const System& system, int coarse) {
+  const auto start = generic_state(system);
+  constexpr double end = 1;
+  const auto reference = stepped<Rkmk4<System>>(system, start, end / 4000, 4000);
+  const auto error = [&](int steps) {
+    return distance(stepped<Method>(system, start, end / steps, steps), reference);
+  };
+  return std::log2(error(coarse) / error(2 * coarse));
+}
+
+template <class System>
+void expect_orders(const System& system) {
+  EXPECT_NEAR(measured_order<Rkmk4<System>>(system, 60), 4, 0.1);
+  EXPECT_NEAR(measured_order<Splitting2<System>>(system, 100), 2, 0.1);
+}
+
+TEST(Order, of_a_free_body_in_space) { expect_orders(sample::free_se3()); }
+TEST(Order, of_a_free_body_with_a_fixed_point) { expect_orders(sample::free_so3()); }
+TEST(Order, of_a_forced_body_in_space) { expect_orders(sample::forced_se3()); }
+TEST(Order, of_a_forced_body_with_a_fixed_point) { expect_orders(sample::forced_so3()); }
+TEST(Order, of_a_forced_body_in_the_plane) { expect_orders(sample::forced_se2()); }
+TEST(Order, of_two_bodies_in_space) { expect_orders(sample::two_bodies_se3()); }
+TEST(Order, of_two_bodies_in_the_plane) { expect_orders(sample::two_bodies_se2()); }
+TEST(Order, of_rkmk4_for_a_free_body_in_the_plane) {
+  const auto system = sample::free_se2();
+  EXPECT_NEAR(measured_order<Rkmk4<std::remove_const_t<decltype(system)>>>(system, 10), 4, 0.1);
+}
+
+/// One step of any length is the exact motion.
+template <class System>
+void expect_exact(const System& system) {
+  const auto start = generic_state(system);
+  const auto reference = stepped<Rkmk4<System>>(system, start, 1.0 / 4000, 4000);
+  EXPECT_LT(distance(stepped<Splitting2<System>>(system, start, 1, 1), reference), 2e-12);
+}
+
+TEST(Splitting2, is_exact_for_a_symmetric_body) {
+  expect_exact(hamotor::RigidBodies{std::tuple{sample::symmetric_body()}});
+}
+
+TEST(Splitting2, is_exact_for_a_spherical_body) {
+  constexpr std::array<double, 3> moments{0.6, 0.6, 0.6};
+  using Ball = hamotor::FreeBody<sample::SE3, double, hamotor::rotation_split(moments)>;
+  expect_exact(hamotor::RigidBodies{std::tuple{Ball(1.3, moments)}});
+}
+
+TEST(Splitting2, is_exact_for_a_free_body_in_the_plane) { expect_exact(sample::free_se2()); }
+
+template <class System>
+void expect_reversible(const System& system) {
+  const auto start = generic_state(system);
+  Splitting2<System> method;
+  auto state = start;
+  for (int k = 0; k < 200; ++k) method.do_step(system, state, 0, 0.02);
+  EXPECT_GT(distance(state, start), 0.1);
+  for (int k = 0; k < 200; ++k) method.do_step(system, state, 0, -0.02);
+  EXPECT_LT(distance(state, start), 1e-13);
+}
+
+TEST(Splitting2, is_time_reversible_to_rounding) {
+  expect_reversible(sample::free_se3());
+  expect_reversible(sample::forced_so3());
+  expect_reversible(sample::forced_se2());
+  expect_reversible(sample::two_bodies_se2());
+}
+
+/// ω = ρ₂(ξ₁) − ρ₁(ξ₂) + μ([ξ₁, ξ₂]) of two tangent vectors (ξ, ρ), δM = M ξ, δμ = ρ: the canonical
+/// form of T*G, left-trivialised.  Returns the largest change of it under one step.
+template <class Method, class System>
+double symplectic_defect(const System& system, double h) {
+  using G = typename System::Group;
+  using Rate = typename G::template Rate<double>;
+  using Momentum = typename G::template Momentum<double>;
+  constexpr auto n = static_cast<std::size_t>(G::dimension);
+  struct Tangent {
+    Rate xi;
+    Momentum rho;
+  };
+  const auto start = generic_state(system);
+  const auto image = stepped<Method>(system, start, h, 1);
+  const auto unit = [](std::size_t a, double by) {
+    std::array<double, n> x{};
+    x[a] = by;
+    return x;
+  };
+  constexpr double e = 1e-3;
+  const auto moved = [&](const Tangent& by, double factor) {
+    auto state = start;
+    state.motors[0] = gp(start.motors[0], exp(factor * by.xi));
+    state.momenta[0] = start.momenta[0] + factor * by.rho;
+    const auto there = stepped<Method>(system, state, h, 1);
+    return Tangent{G::log(gp(reverse(image.motors[0]), there.motors[0])),
+                   there.momenta[0] - image.momenta[0]};
+  };
+  std::vector<Tangent> before;
+  std::vector<Tangent> after;
+  for (std::size_t a = 0; a < 2 * n; ++a) {
+    const Tangent basis{Rate::from(a < n ? unit(a, 1) : unit(0, 0)),
+                        Momentum::from(a < n ? unit(0, 0) : unit(a - n, 1))};
+    const auto p1 = moved(basis, e);
+    const auto m1 = moved(basis, -e);
+    const auto p2 = moved(basis, 2 * e);
+    const auto m2 = moved(basis, -2 * e);
+    before.push_back(basis);
+    after.push_back({(1 / (12 * e)) * (8.0 * (p1.xi - m1.xi) - (p2.xi - m2.xi)),
+                     (1 / (12 * e)) * (8.0 * (p1.rho - m1.rho) - (p2.rho - m2.rho))});
+  }
+  const auto form = [](const Tangent& a, const Tangent& b, const Momentum& mu) {
+    return pairing(b.rho, a.xi) - pairing(a.rho, b.xi) + pairing(mu, ad(a.xi, b.xi));
+  };
+  double worst = 0;
+  for (std::size_t a = 0; a < 2 * n; ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      worst = std::max(worst, std::abs(form(after[a], after[b], image.momenta[0]) -
+                                       form(before[a], before[b], start.momenta[0])));
+    }
+  }
+  return worst;
+}
+
+template <class System>
+void expect_symplectic(const System& system) {
+  EXPECT_LT(symplectic_defect<Splitting2<System>>(system, 0.3), 2e-9);
+  EXPECT_GT(symplectic_defect<Rkmk4<System>>(system, 0.3), 1e-6);
+}
+
+TEST(Splitting2, is_symplectic_and_rkmk4_is_not) {
+  expect_symplectic(sample::free_se3());
+  expect_symplectic(sample::forced_se3());
+  expect_symplectic(sample::forced_so3());
+  expect_symplectic(sample::forced_se2());
+}
+
+TEST(Splitting2, keeps_casimirs_and_the_spatial_momentum_to_rounding) {
+  const auto system = sample::free_se3();
+  const auto start = generic_state(system);
+  const auto casimirs = [](const auto& mu) {
+    return std::array{mu.p1 * mu.p1 + mu.p2 * mu.p2 + mu.p3 * mu.p3,
+                      mu.p1 * mu.l23 + mu.p2 * mu.l31 + mu.p3 * mu.l12};
+  };
+  const auto end =
+      stepped<Splitting2<std::remove_const_t<decltype(system)>>>(system, start, 0.1, 10000);
+  const auto before = casimirs(start.momenta[0]);
+  const auto after = casimirs(end.momenta[0]);
+  EXPECT_NEAR(after[0], before[0], 2e-15);
+  EXPECT_NEAR(after[1], before[1], 2e-15);
+  const auto p = spatial_momentum(start).components();
+  const auto q = spatial_momentum(end).components();
+  for (std::size_t k = 3; k < 6; ++k) EXPECT_NEAR(p[k], q[k], 2e-14);
+}
+
+template <class Method, class System>
+double lost_momentum(const System& system, double h, int steps) {
+  const auto start = generic_state(system);
+  return distance(spatial_momentum(stepped<Method>(system, start, h, steps)),
+                  spatial_momentum(start));
+}
+
+TEST(Splitting2, keeps_the_total_spatial_momentum_of_two_bodies) {
+  const auto space = sample::two_bodies_se3();
+  EXPECT_LT(lost_momentum<Splitting2<std::remove_const_t<decltype(space)>>>(space, 0.02, 5000),
+            1e-12);
+  const auto plane = sample::two_bodies_se2();
+  EXPECT_LT(lost_momentum<Splitting2<std::remove_const_t<decltype(plane)>>>(plane, 0.02, 5000),
+            1e-12);
+}
+
+TEST(Rkmk4, keeps_the_total_spatial_momentum_to_its_order) {
+  const auto system = sample::two_bodies_se3();
+  using Method = Rkmk4<std::remove_const_t<decltype(system)>>;
+  EXPECT_LT(lost_momentum<Method>(system, 0.002, 500), 1e-9);
+}
+
+/// MuJoCo's own conservation test: a uniform box 0.1 × 0.2 × 0.3 m of 1 kg turning at (1, 2, 3)
+/// rad/s, in steps of 0.01 s.
+struct Tumble {
+  static constexpr std::array<double, 3> moments{13e-2 / 12, 10e-2 / 12, 5e-2 / 12};
+  static constexpr hamotor::RigidBodies system{std::tuple{
+      hamotor::FreeBody<sample::SE3, double, hamotor::rotation_split(moments)>(1, moments)}};
+  using System = std::remove_const_t<decltype(system)>;
+  static auto start() {
+    hamotor::StateOf<System> state{};
+    state.motors[0] = hamotor::pga3::Motor<double>::identity();
+    state.momenta[0] = {moments[0], 2 * moments[1], 3 * moments[2], 0, 0, 0};
+    return state;
+  }
+};
+
+/// Least-squares line through equally spaced values: its rise from first to last, with the standard
+/// error of that.
+struct Trend {
+  double rise;
+  double error;
+
+  static Trend of(const std::vector<double>& y) {
+    const auto n = static_cast<double>(y.size());
+    double mean = 0;
+    for (const double value : y) mean += value / n;
+    double xx = 0;
+    double xy = 0;
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      const double x = static_cast<double>(k) / (n - 1) - 0.5;
+      xx += x * x;
+      xy += x * (y[k] - mean);
+    }
+    const double rise = xy / xx;
+    double rest = 0;
+    for (std::size_t k = 0; k < y.size(); ++k) {
+      const double x = static_cast<double>(k) / (n - 1) - 0.5;
+      rest += (y[k] - mean - rise * x) * (y[k] - mean - rise * x);
+    }
+    return {rise, std::sqrt(rest / (n - 2) / xx)};
+  }
+};
+
+TEST(Tumble, million_steps_bound_the_energy_error_and_keep_the_angular_momentum) {
+  auto state = Tumble::start();
+  const double energy = Tumble::system.energy(state);
+  const auto momentum = spatial_momentum(state);
+  const auto norm = [](const auto& mu) { return std::hypot(mu.l23, mu.l31, mu.l12); };
+  Splitting2<Tumble::System> method;
+  constexpr int blocks = 200;
+  constexpr int per_block = 5000;
+  std::vector<double> means;
+  double worst = 0;
+  double lost = 0;
+  for (int block = 0; block < blocks; ++block) {
+    double mean = 0;
+    for (int k = 0; k < per_block; ++k) {
+      method.do_step(Tumble::system, state, 0, 0.01);
+      const double error = Tumble::system.energy(state) / energy - 1;
+      worst = std::max(worst, std::abs(error));
+      mean += error / per_block;
+    }
+    means.push_back(mean);
+    lost = std::max(lost, norm(spatial_momentum(state) - momentum) / norm(momentum));
+  }
+  const Trend trend = Trend::of(means);
+  RecordProperty("energy_error", std::to_string(worst));
+  EXPECT_LT(worst, 1e-5);
+  EXPECT_LT(std::abs(trend.rise), 4 * trend.error + 1e-12)
+      << trend.rise << " +- " << trend.error << " over a million steps";
+  EXPECT_LT(trend.error, 1e-8);
+  EXPECT_LT(lost, 5e-14);
+  EXPECT_LT(std::abs(norm(state.momenta[0]) / norm(momentum) - 1), 1e-14);
+  EXPECT_LT(method.drift().largest, 1e-14);
+  EXPECT_LT(method.drift().sum, 1e-8);
+}
+
+TEST(Tumble, compensated_sums_keep_more_digits_than_plain_ones) {
+  const auto lost = [](auto method) {
+    auto state = Tumble::start();
+    const auto momentum = spatial_momentum(state);
+    for (int k = 0; k < 200000; ++k) method.do_step(Tumble::system, state, 0, 0.001);
+    return distance(spatial_momentum(state), momentum);
+  };
+  EXPECT_LT(lost(Splitting2<Tumble::System>{}),
+            0.2 * lost(Splitting2<Tumble::System, Summation::plain>{}));
+}
+
+TEST(Drift, shows_what_renormalisation_had_to_correct) {
+  const auto system = sample::forced_se3();
+  using System = std::remove_const_t<decltype(system)>;
+  auto state = generic_state(system);
+  state.motors[0] = (1 + 1e-6) * state.motors[0];
+  state.motors[0].e0123 += 3e-6;
+  const auto defect = hamotor::Space<sample::SE3>::unit_defect(state.motors[0]);
+  Rkmk4<System> rkmk4;
+  Splitting2<System> splitting2;
+  auto other = state;
+  rkmk4.do_step(system, state, 0, 1e-3);
+  splitting2.do_step(system, other, 0, 1e-3);
+  const double expected = std::max(std::abs(defect.scalar), std::abs(defect.pseudoscalar));
+  for (const auto& drift : {rkmk4.drift(), splitting2.drift()}) {
+    EXPECT_NEAR(drift.largest, expected, 1e-10);
+    EXPECT_EQ(drift.sum, drift.largest);
+  }
+  for (const auto& corrected : {state, other}) {
+    const auto left = hamotor::Space<sample::SE3>::unit_defect(corrected.motors[0]);
+    EXPECT_LT(std::abs(left.scalar), 5e-11);
+    EXPECT_LT(std::abs(left.pseudoscalar), 5e-11);
+  }
+}
+
+TEST(Drift, correction_is_the_groups_own_normalisation) {
+  auto motor = generic_state(sample::free_se3()).motors[0];
+  motor.s *= 1 + 1e-9;
+  motor.e0123 += 1e-9;
+  using Space = hamotor::Space<sample::SE3>;
+  const auto corrected = motor + Space::unit_correction(motor, Space::unit_defect(motor));
+  EXPECT_LT(distance(corrected, normalize(motor)), 4e-16);
+}
+
+template <class S>
+void expect_same_motion_as_double(double tolerance) {
+  const auto system = sample::two_bodies_se3();
+  const auto same = sample::two_bodies_se3<S>();
+  using System = std::remove_const_t<decltype(system)>;
+  using Same = std::remove_const_t<decltype(same)>;
+  const auto start = generic_state(system);
+  const auto expected = stepped<Splitting2<System>>(system, start, 0.01, 200);
+  const auto got = stepped<Splitting2<Same>>(same, generic_state(same), 0.01, 200);
+  const auto fourth = stepped<Rkmk4<Same>>(same, generic_state(same), 0.01, 200);
+  const auto expected_fourth = stepped<Rkmk4<System>>(system, start, 0.01, 200);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_LT(distance(got.motors[i].template cast<double>(), expected.motors[i]), tolerance);
+    EXPECT_LT(distance(fourth.momenta[i].template cast<double>(), expected_fourth.momenta[i]),
+              tolerance);
+  }
+}
+
+TEST(Scalars, float_and_long_double_move_alike) {
+  expect_same_motion_as_double<float>(2e-5);
+  expect_same_motion_as_double<long double>(1e-13);
+}
+
+TEST(Splitting2, evaluates_the_forque_anew_when_the_state_was_changed_between_steps) {
+  const auto system = sample::forced_se3();
+  using Method = Splitting2<std::remove_const_t<decltype(system)>, Summation::plain>;
+  Method used;
+  auto state = generic_state(system);
+  used.do_step(system, state, 0, 0.01);
+  state.motors[0] = gp(state.motors[0], state.motors[0]);
+  auto fresh_state = state;
+  used.do_step(system, state, 0, 0.01);
+  Method fresh;
+  fresh.do_step(system, fresh_state, 0, 0.01);
+  EXPECT_EQ(state, fresh_state);
+}
+
+}  // namespace
