@@ -1,0 +1,82 @@
+"""Everything that the README shows is run, and shows what it says."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+NUMBER = re.compile(r"-?\d[\d,]*\.?\d*(?:e[+-]?\d+)?")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+
+
+def environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": str(ROOT / "generator")}
+
+
+def commands() -> list[tuple[str, str]]:
+    found = []
+    for block in blocks("console"):
+        first, _, output = block.partition("\n")
+        assert first.startswith("$ ./hamotor "), first
+        found.append((first.removeprefix("$ ./hamotor "), output))
+    return found
+
+
+def without_measurements(text: str) -> list[str]:
+    """The words of an output: numbers, times and the state of the cache differ between machines."""
+    lines = [line for line in text.splitlines() if "compiled" not in line]
+    words = [re.sub(NUMBER, "#", line) for line in lines]
+    return [re.sub(r"# (ns|µs|ms|s),", "# s,", line).rstrip() for line in words]
+
+
+@pytest.mark.parametrize(("command", "output"), commands(), ids=[c for c, _ in commands()])
+def test_readme_command_prints_what_the_readme_shows(
+    command: str, output: str, tmp_path: Path
+) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "hamotor", *shlex.split(command)],
+        cwd=tmp_path,
+        env=environment(),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    if command.startswith("run "):
+        assert without_measurements(done.stdout) == without_measurements(output)
+    else:
+        assert done.stdout == output
+
+
+def test_readme_python_runs(tmp_path: Path) -> None:
+    assert blocks("python")
+    for block in blocks("python"):
+        subprocess.run([sys.executable, "-c", block], cwd=tmp_path, env=environment(), check=True)
+
+
+def test_readme_application_is_the_consumer_that_packaging_builds() -> None:
+    (shown,) = blocks("cpp")
+    assert shown == (ROOT / "tests/consumer/main.cpp").read_text(encoding="utf-8")
+    assert len(shown.splitlines()) < 30
+
+
+def test_readme_cmake_lines_are_the_consumers() -> None:
+    for block, folder in zip(blocks("cmake"), ("find_package", "add_subdirectory"), strict=True):
+        project = (ROOT / "tests/consumer" / folder / "CMakeLists.txt").read_text(encoding="utf-8")
+        assert block in project
+
+
+def test_readme_links_lead_somewhere() -> None:
+    for target in re.findall(r"\]\(([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
