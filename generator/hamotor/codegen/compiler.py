@@ -27,6 +27,9 @@ from hamotor.codegen.spec import AlgebraSpec
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
+INLINED_OPERATIONS = 128
+"""Kernels of at most so many additions, multiplications and divisions are always inlined: for
+them the way of a result through memory costs more than the arithmetic."""
 RUNTIME_HEADERS = {"bivector_exponential": "hamotor/bivector_exponential.hpp"}
 """Functions that stand in a header of their own."""
 
@@ -172,12 +175,14 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
     if kernel.pairs and kernel.pairs[1]:
         kept, possible = kernel.pairs
         sparsity = f"{kept} of {possible} pairs of components"
+    inlined = kernel.program.cost.total <= INLINED_OPERATIONS
     return {
         "title": kernel_title(kernel),
         "law": kernel.law,
         "notes": kernel.notes,
         "cost": str(kernel.program.cost),
         "sparsity": sparsity,
+        "attributes": "[[nodiscard]]" + " HAMOTOR_INLINE" * inlined,
         "signature": cpp.signature_text(kernel.name, kernel.program),
         "body": cpp.body_lines(kernel.program),
     }

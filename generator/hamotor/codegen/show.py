@@ -177,7 +177,7 @@ def _text(kernel: Kernel, notes: Sequence[str]) -> str:
         *(f"/// {note}" for note in [*data["notes"], *notes]),
         f"/// Cost: {data['cost']}.{sparsity}",
         "template <class S>",
-        f"[[nodiscard]] constexpr {data['signature']} noexcept {{",
+        f"{data['attributes']} constexpr {data['signature']} noexcept {{",
         *data["body"],
         "}",
     ]
