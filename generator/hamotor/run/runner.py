@@ -32,7 +32,9 @@ _ROWS_PER_CHUNK = 1 << 15
 _MOST_STEPS = 10**15
 _MOST_HALVINGS = 30
 _ROWS_OF_A_TOLERANCE_RUN = 2000
+_TOGETHER = 0.01  # below this difference the runs have begun to converge
 _STALLED_RUNGS = 3
+_PATIENCE = 14
 _VANISHING = 1e-12
 _FIRST_TURN = 0.25  # a first guess turns the motor by at most a quarter of a radian in a step
 
@@ -375,8 +377,8 @@ def meet_tolerance(
 
     The difference is the largest over all bodies of |ΔM| (any component, the sign of M fixed) and
     |Δμ| over the norm of the initial momentum.  The finer run of the last pair is returned with its
-    recorder; the others are discarded.  Status "failed" with the reason in `problem` when rounding
-    or the cap on halvings comes first.  `every` None keeps about two thousand rows.
+    recorder; the others are discarded.  Status "failed" with the reason in `problem` when rounding,
+    chaos or the cap on halvings comes first.  `every` None keeps about two thousand rows.
     """
     if not (math.isfinite(tolerance) and tolerance > 0):
         raise UsageError(f"tolerance must be a positive number, not {tolerance!r}.")
@@ -431,12 +433,8 @@ def meet_tolerance(
         if difference is not None and difference <= tolerance:
             status = "finished"
             break
-        if _stalled(rungs):
-            reason = (
-                f"halving the step no longer brings the runs together: they still differ by "
-                f"{difference:.3g}. Rounding stands in the way; ask for more than "
-                f"{2 * min(_differences(rungs)):.2g}."
-            )
+        reason = _hopeless(rungs)
+        if reason:
             break
         # Half of the step in use, so that the steps of a rung are nested in the next one's.
         step = rung_plan.step / 2
@@ -455,17 +453,25 @@ def meet_tolerance(
     return replace(outcome, status=status, problem=reason, ladder=ladder), recorder
 
 
-def _differences(rungs: Sequence[Rung]) -> list[float]:
-    return [rung.difference for rung in rungs if rung.difference is not None]
-
-
-def _stalled(rungs: Sequence[Rung]) -> bool:
-    """Whether the differences are small and have stopped shrinking."""
-    differences = _differences(rungs)
-    if len(differences) <= _STALLED_RUNGS:
-        return False
-    recent = differences[-_STALLED_RUNGS:]
-    return min(recent) >= differences[-_STALLED_RUNGS - 1] and recent[-1] < 1e-6
+def _hopeless(rungs: Sequence[Rung]) -> str:
+    """Why further halving would not help; "" while it may."""
+    differences = [rung.difference for rung in rungs if rung.difference is not None]
+    if not differences:
+        return ""
+    best = min(differences)
+    if best >= _TOGETHER:
+        if len(rungs) <= _PATIENCE:
+            return ""
+        return (
+            f"after {len(rungs) - 1} halvings of the step the runs still end in different places. "
+            "The motion is chaotic over this time: end it earlier."
+        )
+    if differences.index(best) >= len(differences) - _STALLED_RUNGS:
+        return ""
+    return (
+        f"the runs came within {best:.2g} of each other and not closer. The motion amplifies "
+        "rounding errors to that size: ask for no less, or end it earlier."
+    )
 
 
 def first_step(
