@@ -1,0 +1,127 @@
+"""The bundled scenes, all the way: file → C++ → library → steps → report, trajectory, pictures."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hamotor
+from hamotor.scene import bundled_scenes
+
+SCENES = [name for name, _ in bundled_scenes()]
+PACKAGE = Path(hamotor.__file__).parents[1]
+
+
+def command(*arguments: str, folder: Path) -> subprocess.Popen[str]:
+    return subprocess.Popen(
+        [sys.executable, "-P", "-m", "hamotor", *arguments],
+        env={**os.environ, "PYTHONPATH": str(PACKAGE)},
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_bundled_scene_runs_and_keeps_what_is_conserved(name: str, tmp_path: Path) -> None:
+    run = hamotor.load(name).run(out=tmp_path)
+    assert run.status == "finished"
+    assert {p.name for p in tmp_path.iterdir()} == {
+        "run.json",
+        "trajectory",
+        "path.png",
+        "conserved.png",
+    }
+    for quantity, said in run.conserved.items():
+        allowed = 1e-3 if quantity == "energy" else 1e-12
+        assert said["max_relative_error"] <= allowed, quantity
+    for body in run.bodies:
+        rotation = run.rotation(body)
+        unit = np.einsum("nij,nkj->nik", rotation, rotation)
+        np.testing.assert_allclose(unit, np.eye(unit.shape[-1])[np.newaxis] + 0 * unit, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_state_a_scene_starts_from_is_the_first_row(name: str) -> None:
+    simulation = hamotor.load(name)
+    run = simulation.run(end=1e-6, step=1e-6)
+    first = [
+        run.trajectory[f"{body}.{part}.{blade}"][0]
+        for body in run.bodies
+        for part in ("motor", "momentum")
+        for blade in run.final[body][part]
+    ]
+    np.testing.assert_allclose(first, simulation.state, rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("method", ["rkmk4", "splitting2"])
+def test_the_methods_agree_where_the_steps_are_short(method: str) -> None:
+    simulation = hamotor.load("tumble")
+    reference = simulation.run(method="rkmk4", step=1e-3)
+    run = simulation.run(method=method, step=1e-4, every=10)
+    assert hamotor.compare(reference, run).largest < 1e-7
+
+
+def test_a_tolerance_is_a_bound_on_the_error_of_the_final_state() -> None:
+    simulation = hamotor.load("tumble")
+    reference = simulation.run(method="rkmk4", step=2.5e-4).motor()[-1]
+    for tolerance in (1e-4, 1e-7):
+        final = simulation.run(tolerance=tolerance).motor()[-1]
+        sign = np.sign(final @ reference)
+        assert np.abs(final - sign * reference).max() <= tolerance
+
+
+def test_a_scene_that_cannot_be_told_from_chaos_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hamotor.run import runner
+
+    monkeypatch.setattr(runner, "_PATIENCE", 4)
+    with pytest.raises(hamotor.RunFailed, match="chaotic over this time: end it earlier"):
+        hamotor.load("spring_pendulum").run(tolerance=1e-6)
+
+
+def test_the_second_command_does_not_compile_again(tmp_path: Path) -> None:
+    first = command("run", "tumble", "--json", folder=tmp_path)
+    first.communicate(timeout=300)
+    assert first.returncode == 0
+    second = command("run", "tumble", "--json", folder=tmp_path)
+    printed, messages = second.communicate(timeout=300)
+    said = json.loads(printed)
+    assert messages == ""
+    assert said["timing"]["compile_cached"] is True
+    assert said["timing"]["compile_s"] == 0
+    assert printed == (tmp_path / "runs" / "tumble" / "run.json").read_text()
+
+
+def test_ctrl_c_keeps_what_was_computed_and_exits_with_130(tmp_path: Path) -> None:
+    hamotor.load("tumble").compile()
+    options = "--end 1e9 --every 10000 --no-pictures --json --out kept"
+    process = command("run", "tumble", *options.split(), folder=tmp_path)
+    while not list(tmp_path.glob("kept/.running-*/0/trajectory")):
+        assert process.poll() is None
+        time.sleep(0.05)
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    printed, messages = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "interrupted; what was computed is kept" in messages
+    said = json.loads(printed)
+    assert said["status"] == "interrupted"
+    run = hamotor.open_run(tmp_path / "kept")
+    assert run.t[-1] == said["t_end"] > 0
+    assert not [p for p in (tmp_path / "kept").iterdir() if p.name.startswith(".")]
+
+
+def test_the_api_does_what_the_readme_promises() -> None:
+    run = hamotor.load("dzhanibekov").run(end=10)
+    assert run.t[-1] == 10.0
+    assert run.motor("handle").shape == (len(run.t), 8)
+    assert run.rotation("handle").shape == (len(run.t), 3, 3)
