@@ -133,7 +133,7 @@ def _program(build: Build) -> Path:
     program = BUILDS / f"{name}{identity.hexdigest()[:16]}"
     if not program.exists():
         BUILDS.mkdir(parents=True, exist_ok=True)
-        older = list(BUILDS.glob(f"{name}*"))
+        older = list(BUILDS.glob(f"{name}{'?' * 16}"))
         unfinished = BUILDS / f"{os.getpid()}-{program.name}"
         code = unfinished.with_name(f"{unfinished.name}.cpp")
         code.write_text(source, encoding="utf-8")
