@@ -23,8 +23,9 @@ PAIRS = {
     "bivector_exponential",
     "compensated_dot_pair",
     "double_word_sqrt",
-    "double_word_unscale",
     "double_word_ratio",
+    "double_word_scaled",
+    "scaling",
     "sin_cos",
 }
 """Functions of the runtime that return several numbers."""

@@ -24,6 +24,9 @@ from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_
 from hamotor.codegen.spec import AlgebraSpec, Request
 from hamotor.errors import UsageError
 
+ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
+"""Builds a kernel of an operand, a result, a namespace and what begins an error message."""
+
 LAWS = {
     "gp": "a b, the geometric product",
     "outer": "a ∧ b",
@@ -141,17 +144,14 @@ def _unary_kernel(
             target = result or spec.element("Scalar", where)
             return quadratic_kernel(algebra, "norm_squared", "<a ~a>₀", operand, target)
         case "normalize":
+            if _simple(algebra, operand):
+                return transcendental.normalize_kernel(algebra, operand, result or operand, where)
             return closedform.normalize_kernel(algebra, operand, result or operand, where)
         case operation:
             if result is None:
                 raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
-            build = {
-                "exp": exp_kernel,
-                "log": transcendental.log_kernel,
-                "cayley": closedform.cayley_kernel,
-                "cayley_inverse": closedform.cayley_inverse_kernel,
-            }[operation]
-            return build(algebra, operand, result, "", where)
+            build_form = _closed_form(algebra, operation, operand)
+            return build_form(algebra, operand, result, "", where)
 
 
 def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
@@ -211,24 +211,36 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
     ]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
-    kernels.append(exp_kernel(algebra, rate, element, namespace, where))
+    operations = [("exp", rate, element), ("cayley", rate, element)]
     plane = transcendental.split_bivectors(algebra, rate.blades)
     if plane is not None and plane.rotation:
-        kernels.append(transcendental.log_kernel(algebra, element, rate, namespace, where))
-    kernels += [
-        closedform.cayley_kernel(algebra, rate, element, namespace, where),
-        closedform.cayley_inverse_kernel(algebra, element, rate, namespace, where),
-    ]
+        operations.insert(1, ("log", element, rate))
+    for operation, operand, result in [*operations, ("cayley_inverse", element, rate)]:
+        build = _closed_form(algebra, operation, operand)
+        kernels.append(build(algebra, operand, result, namespace, where))
     return kernels
 
 
-def exp_kernel(
-    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
-) -> Kernel:
-    """exp: the form accurate for every input where there is one, else the general closed form."""
-    simple = transcendental.split_bivectors(algebra, operand.blades) is not None
-    build = transcendental.exp_kernel if simple else closedform.exp_kernel
-    return build(algebra, operand, result, namespace, where)
+def _simple(algebra: Algebra, operand: Element) -> bool:
+    """Whether the forms that are accurate for every input apply to the operand's bivectors."""
+    bivectors = [b for b in operand.blades if grade(b) == 2]
+    return transcendental.split_bivectors(algebra, bivectors) is not None
+
+
+def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedForm:
+    simple: dict[str, ClosedForm] = {
+        "exp": transcendental.exp_kernel,
+        "log": transcendental.log_kernel,
+        "cayley": transcendental.cayley_kernel,
+        "cayley_inverse": transcendental.cayley_inverse_kernel,
+    }
+    general: dict[str, ClosedForm] = {
+        "exp": closedform.exp_kernel,
+        "cayley": closedform.cayley_kernel,
+        "cayley_inverse": closedform.cayley_inverse_kernel,
+    }
+    forms = simple if _simple(algebra, operand) else simple | general
+    return forms[operation]
 
 
 def _pairing(group: LieGroup) -> Kernel:

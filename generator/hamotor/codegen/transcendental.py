@@ -1,4 +1,4 @@
-"""exp and log accurate for every input, for algebras whose rotations have one plane.
+"""exp, log, Cayley maps, normalisation: accurate for every input, where rotations have one plane.
 
 Covered here: bivectors B with B² = −θ² + W, θ² a sum of squares, W of grade 4 and W² = 0: the
 projective algebras of the plane and of space and the rotations of space.  With J(B) = <B W>/(2t),
@@ -9,17 +9,19 @@ W = 2 t I,
 The programs are accurate for every finite input, not only for moderate ones:
 * θ is a double-word number, so that sin θ is right to an ulp also near multiples of π and for
   large θ, where rounding θ alone would lose log10(θ) digits;
-* t is a compensated dot product, so that the part of B along the axis does not leak into the part
-  across it when sinc θ ≪ 1;
+* sums that may cancel are compensated: the part of B along the axis does not leak into the part
+  across it when sinc θ ≪ 1, nor that of M near −1;
 * rotation and translation parts are scaled by powers of two (exactly) when squares would overflow
   or underflow.
-log is the principal one, exp(log M) = M, 0 ≤ θ ≤ π, by atan2 alone.
+log is the principal one, exp(log M) = M, 0 ≤ θ ≤ π, by atan2 alone.  It, Cayley's maps and
+`normalize` take a motor that is not quite a unit for the unit motor nearest to it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, grade
@@ -101,6 +103,8 @@ def split_bivectors(algebra: Algebra, blades: Sequence[Blade]) -> Plane | None:
 
 
 def _required_split(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
+    if others := [algebra.blade_name(b) for b in blades if grade(b) != 2]:
+        raise UsageError(f"{where}: takes bivectors, which {', '.join(others)} are not")
     plane = split_bivectors(algebra, blades)
     if plane is None:
         raise UsageError(
@@ -168,28 +172,70 @@ def _outputs(
     return tuple(outputs)
 
 
+@dataclass(frozen=True)
+class Scaled:
+    """Numbers times the power of two that keeps their squares in range.
+
+    inward, outward: names of that power and its inverse; the roots are their square roots.
+    """
+
+    values: dict[Blade, Expression]
+    inward: Expression
+    outward: Expression
+    root_inward: Expression
+    root_outward: Expression
+
+
 def _scaled(
-    writer: Writer, values: dict[Blade, Expression], prefix: str, algebra: Algebra
-) -> tuple[Expression, dict[Blade, Expression]]:
-    """The values times a power of two that keeps their squares in range, and that power."""
-    scale = writer.let(f"{prefix}_scale", call("range_scale", call("max_abs", *values.values())))
-    return scale, {
-        b: writer.let(f"{prefix}_{algebra.blade_name(b)}", Product(scale, x))
+    writer: Writer,
+    values: Mapping[Blade, Expression],
+    prefix: str,
+    algebra: Algebra,
+    *others: Expression,
+) -> Scaled:
+    """Scale values by the largest of them and of the others."""
+    name = f"{prefix}_scaling"
+    writer.let(name, call("scaling", call("max_abs", *others, *values.values())))
+    inward, outward, root_inward, root_outward = (
+        Name(f"{name}.{field}") for field in ("in", "out", "root_in", "root_out")
+    )
+    scaled = {
+        b: writer.let(f"{prefix}_{algebra.blade_name(b)}", Product(inward, x))
         for b, x in values.items()
     }
+    return Scaled(scaled, inward, outward, root_inward, root_outward)
 
 
 def _squared(values: Mapping[Blade, Expression]) -> list[Expression]:
     return [x for value in values.values() for x in (value, value)]
 
 
-def _dot_terms(
-    plane: Plane, rotation: Mapping[Blade, Expression], translation: Mapping[Blade, Expression]
-) -> list[Expression]:
-    terms: list[Expression] = []
-    for u, v, sign in plane.pitch:
-        terms += [signed(sign, rotation[u]), translation[v]]
-    return terms
+def _pairs(plane: Plane, rotation: Mapping[Blade, Expression]) -> list[tuple[Expression, Blade]]:
+    """The factors of t = Σ rotation_u translation_v: signed rotation part and blade v."""
+    return [(signed(sign, rotation[u]), v) for u, v, sign in plane.pitch]
+
+
+def _axis(plane: Plane, rotation: Mapping[Blade, Expression]) -> dict[Blade, Expression]:
+    """J of the rotation part: the translation blades along the axis."""
+    return {v: signed(sign, rotation[u]) for v, (u, sign) in plane.along.items()}
+
+
+def _commutator(
+    algebra: Algebra, a: Mapping[Blade, Expression], b: Mapping[Blade, Expression]
+) -> dict[Blade, list[tuple[Expression, Expression]]]:
+    """a × b = ½(ab − ba) as sums of signed products."""
+    result: dict[Blade, list[tuple[Expression, Expression]]] = {}
+    for blade_a, x in a.items():
+        for blade_b, y in b.items():
+            for blade, sign in algebra.commutator(blade_a, blade_b).items():
+                result.setdefault(blade, []).append((signed(int(sign), x), y))
+    return result
+
+
+def _sum_of_two(terms: Sequence[tuple[Expression, Expression]]) -> Expression:
+    """a b + c d, right to an ulp of itself whatever cancels."""
+    (a, b), (c, d) = terms
+    return call("compensated_dot", a, b, c, d)
 
 
 def exp_kernel(
@@ -201,48 +247,41 @@ def exp_kernel(
     plane = _required_split(algebra, sorted(value), where)
     writer = Writer()
     b = _coefficients(writer, algebra, value, "b")
-    ws_scale, ws = _scaled(writer, {u: b[u] for u in plane.rotation}, "w", algebra)
-    squares = call("compensated_dot_pair", *_squared(ws))
-    theta_s = writer.let("scaled_angle", call("double_word_sqrt", squares))
-    theta = writer.let("angle", call("double_word_unscale", theta_s, ws_scale))
-    writer.let("turn", call("sin_cos", theta))
-    sine, cosine = Name("turn.sin"), Name("turn.cos")
-    hi = Name("angle.hi")
-    sinc = writer.let("sinc", Select(hi, Quotient(sine, hi), ONE))
+    w = _scaled(writer, {u: b[u] for u in plane.rotation}, "w", algebra)
+    writer.let("squares", call("compensated_dot_pair", *_squared(w.values)))
+    writer.let("length", call("double_word_sqrt", Name("squares")))
+    writer.let("angle", call("double_word_scaled", Name("length"), w.outward))
+    writer.let("turn", call("sin_cos", Name("angle")))
+    sine, cosine, length = Name("turn.sin"), Name("turn.cos"), Name("length.hi")
+    spin = writer.let("spin", Select(length, Quotient(sine, length), ZERO))
     out: dict[Blade, Expression] = {0: cosine}
     for u in plane.rotation:
-        out[u] = Product(sinc, b[u])
+        out[u] = Product(spin, w.values[u])
+    if plane.translation:
+        # Scaled up, θ is so small that sin θ / θ is 1; sin θ itself may be denormal there.
+        moderate = Sum(number(Fraction(3, 2)), Negative(w.inward))
+        sinc = writer.let("sinc", Select(moderate, Product(spin, w.inward), ONE))
     if plane.pitch:
-        vs_scale, vs = _scaled(writer, {v: b[v] for v in plane.translation}, "v", algebra)
-        unscale = writer.let("v_unscale", Quotient(ONE, vs_scale))
-        dot = call("compensated_dot", *_dot_terms(plane, ws, vs))
-        theta_hi = Name("scaled_angle.hi")
-        pitch = writer.let("pitch", Select(theta_hi, Quotient(dot, theta_hi), ZERO))
-        inverse = writer.let("inverse_angle", Select(theta_hi, Quotient(ONE, theta_hi), ZERO))
-        along = writer.let(
-            "along",
-            Product(Product(Sum(sinc, Negative(cosine)), inverse), pitch),
-        )
-        for v in plane.translation:
-            terms: Expression = Product(sinc, vs[v])
-            if v in plane.along:
-                u, sign = plane.along[v]
-                terms = MultiplyAdd(along, signed(sign, ws[u]), terms)
-            out[v] = Product(unscale, terms)
-        out[_quadrivector(plane)] = Product(unscale, Product(sine, pitch))
+        v = _scaled(writer, {v: b[v] for v in plane.translation}, "v", algebra)
+        terms = [x for axis, blade in _pairs(plane, w.values) for x in (axis, v.values[blade])]
+        product = writer.let("product", call("compensated_dot", *terms))
+        square = Name("squares.hi")
+        share = Select(square, Quotient(product, square), ZERO)
+        along = writer.let("along", Product(Sum(sinc, Negative(cosine)), share))
+        axis = _axis(plane, w.values)
+        for blade in plane.translation:
+            moved = MultiplyAdd(along, axis[blade], Product(sinc, v.values[blade]))
+            out[blade] = Product(v.outward, moved)
+        out[_quadrivector(plane)] = Product(v.outward, Product(spin, product))
     else:
-        for v in plane.translation:
-            out[v] = Product(sinc, b[v])
+        for blade in plane.translation:
+            out[blade] = Product(sinc, b[blade])
     program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
-    return Kernel(
-        "exp",
-        "exp(B) = 1 + B + B²/2 + …",
-        program,
-        None,
-        namespace,
-        None,
-        ("Accurate to 4 ulp of the result's norm for every finite B.",),
-    )
+    bound = "Relative error at most 4 ulp of the result's norm"
+    notes = [f"{bound}, for half angles up to 1/(8 ε)."]
+    if plane.translation:
+        notes = [f"{bound} and ε² of the translation's, for half", "angles up to 1/(8 ε)."]
+    return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, tuple(notes))
 
 
 def _quadrivector(plane: Plane) -> Blade:
@@ -253,82 +292,227 @@ def _quadrivector(plane: Plane) -> Blade:
 def log_kernel(
     algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
 ) -> Kernel:
-    """Principal logarithm of a unit versor: exp(log M) = M, angle θ in [0, π]."""
+    """Principal logarithm of a unit versor: exp(log M) = M, angle θ in [0, π].
+
+    With M = cos θ + sin θ L + …: the rotation part is θ L; the translation part is θ / sin θ
+    times the part of M's across the axis, −L × (L × M), plus the pitch along it.
+    """
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
     plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
     writer = Writer()
     m = _coefficients(writer, algebra, value, "m")
-    scalar = m[0]
-    ws_scale, ws = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
-    squares = writer.let("squares", call("compensated_dot_pair", *_squared(ws)))
-    writer.let("scaled_sine", call("double_word_sqrt", squares))
-    sine_s = Name("scaled_sine.hi")
-    sine = writer.let("sine", Quotient(sine_s, ws_scale))
-    angle = writer.let("angle", call("atan2", sine, scalar))
-    inverse = writer.let("inverse_sine", Select(sine_s, Quotient(ONE, sine_s), ZERO))
-    ratio = writer.let("ratio", Product(angle, inverse))
-    out: dict[Blade, Expression] = {u: Product(ratio, ws[u]) for u in plane.rotation}
-    notes = ["Principal: exp(log M) = M with half angle in [0, π]; accurate to 4 ulp of the norm."]
-    # A half turn of the sheet: M = −T has any axis; the one along its translation gives exp back.
-    half_turn = writer.let("half_turn", Select(Negative(scalar), call("pi"), ZERO))
+    cosine = m[0]
+    r = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
+    square = writer.let("square", call("compensated_dot", *_squared(r.values)))
+    length = writer.let("length", call("sqrt", square))
+    sine = writer.let("sine", Product(length, r.outward))
+    angle = writer.let("angle", call("atan2", sine, cosine))
+    # θ / sin θ itself where it is moderate; else scaled, and applied in steps that stay in range.
+    ratio = Select(cosine, Quotient(angle, sine), Quotient(angle, length))
+    stretch = writer.let("stretch", Select(length, ratio, ZERO))
+    out: dict[Blade, Expression] = {
+        u: Product(stretch, Select(cosine, m[u], x)) for u, x in r.values.items()
+    }
+    half_turn = writer.let("half_turn", Select(Negative(cosine), call("pi"), ZERO))
+    first = plane.rotation[0]
+    notes = [
+        "Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the",
+        "result's norm.",
+    ]
+    if not plane.translation:
+        out[first] = Select(length, out[first], half_turn)
+        program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+        return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
+
+    straight = writer.let("straight", Quotient(ONE, cosine))
+    moved = {v: m[v] for v in plane.translation}
     if plane.pitch:
-        vs_scale, vs = _scaled(writer, {v: m[v] for v in plane.translation}, "q", algebra)
-        unscale = writer.let("q_unscale", Quotient(ONE, vs_scale))
-        dot = writer.let("overlap", call("compensated_dot_pair", *_dot_terms(plane, ws, vs)))
-        writer.let("share", call("double_word_ratio", dot, squares))
         quad = _quadrivector(plane)
-        pss = Product(vs_scale, m[quad])
-        norm2 = MultiplyAdd(scalar, scalar, Product(sine, sine))
-        pitch = writer.let(
-            "pitch",
-            Quotient(
-                MultiplyAdd(scalar, Product(Name("overlap.hi"), inverse), Product(sine, pss)), norm2
-            ),
+        q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
+    if not plane.pitch:
+        root = writer.let("root", Select(cosine, ONE, r.root_inward))
+        size = writer.let("q_size", call("max_abs", *moved.values()))
+        turned = writer.let("turned", Select(size, ZERO, half_turn))
+        out[first] = Select(length, out[first], turned)
+        for blade, x in moved.items():
+            across = Product(Product(Product(stretch, x), root), root)
+            out[blade] = Select(length, across, Product(straight, x))
+        notes.append(
+            "−T, T ≠ 1 a translation, has no logarithm here; that of T, the same motion, is given."
         )
-        along = writer.let("along", Product(pitch, inverse))
-        length2 = sum_of_products([(vs[v], vs[v]) for v in plane.along])
-        length = writer.let("q_length", call("sqrt", length2))
-        over = writer.let("half_turn_ratio", Select(length, Quotient(half_turn, length), ZERO))
-        first = plane.rotation[0]
-        for u in plane.rotation:
-            v, sign = next((v, s) for v, (w, s) in plane.along.items() if w == u)
-            axis: Expression = Product(over, signed(sign, vs[v]))
-            axis = Select(length, axis, half_turn if u == first else ZERO)
-            out[u] = Select(sine_s, out[u], axis)
-        straight = writer.let("straight", Quotient(ONE, scalar))
-        for v in plane.translation:
-            u, sign = plane.along[v]
-            across = MultiplyAdd(
-                Name("share.lo"),
-                signed(sign, ws[u]),
-                MultiplyAdd(Name("share.hi"), signed(sign, ws[u]), vs[v]),
-            )
-            general = MultiplyAdd(
-                Negative(along), signed(sign, ws[u]), Product(angle, Quotient(across, sine))
-            )
-            out[v] = Product(unscale, Select(sine_s, general, Product(straight, vs[v])))
-    else:
-        translation = [m[v] for v in plane.translation]
-        if translation:
-            size = writer.let("q_size", call("max_abs", *translation))
-            half_turn = writer.let("turned", Select(size, ZERO, half_turn))
-            straight = writer.let("straight", Quotient(ONE, scalar))
-            notes.append(
-                "−T, T ≠ 1 a translation, has no logarithm here; that of T, the same motion, is "
-                "given."
-            )
-            for v in plane.translation:
-                out[v] = Select(
-                    sine_s, Product(angle, Quotient(m[v], sine)), Product(straight, m[v])
-                )
-        first = plane.rotation[0]
-        out[first] = Select(sine_s, out[first], half_turn)
+        program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+        return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
+
+    root = writer.let(
+        "root", Select(cosine, q.root_outward, Product(r.root_inward, q.root_outward))
+    )
+    pairs = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+    dot = call("compensated_dot", *pairs)
+    share = Select(length, Quotient(dot, square), ZERO)
+    sine2 = Product(square, r.outward), r.outward
+    norm2 = writer.let("norm2", call("compensated_dot", cosine, cosine, *sine2))
+    lengthwise = call("compensated_dot", cosine, share, q.values[quad], r.outward)
+    along = writer.let("along", Quotient(negative(lengthwise), norm2))
+    q_moved = {v: q.values[v] for v in moved}
+    normal = {
+        blade: writer.let(f"n_{algebra.blade_name(blade)}", Quotient(_sum_of_two(terms), square))
+        for blade, terms in _commutator(algebra, r.values, q_moved).items()
+    }
+    axis = _axis(plane, r.values)
+    double = _commutator(algebra, r.values, normal)
+    # −T turns by π about the direction of its translation.
+    squares = sum_of_products([(q.values[v], q.values[v]) for v in moved])
+    q_length = writer.let("q_length", call("sqrt", squares))
+    turn = writer.let("turn", Select(q_length, Quotient(half_turn, q_length), ZERO))
+    for blade, x in axis.items():
+        u, sign = plane.along[blade]
+        about: Expression = Product(turn, signed(-sign, q.values[blade]))
+        about = Select(q_length, about, half_turn if u == first else ZERO)
+        out[u] = Select(length, out[u], about)
+        part = Product(stretch, negative(_sum_of_two(double[blade])))
+        across = Product(Product(part, root), root)
+        moved_along = Product(Product(along, x), q.outward)
+        out[blade] = Select(length, Sum(across, moved_along), Product(straight, m[blade]))
     program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
     return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
 
+def cayley_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """(1 + B)(1 − B)⁻¹: the rotation by 2 atan θ and what it does to the rest.
+
+    With B = r + q, D = 1 + θ², g = r / D: 2 g, and 2 (q / D − 2 (g·q) g) for the translation part.
+    """
+    (parameter,) = parameters_for(operand)
+    value = value_of(parameter)
+    plane = _required_split(algebra, sorted(value), where)
+    writer = Writer()
+    b = _coefficients(writer, algebra, value, "b")
+    r = _scaled(writer, {u: b[u] for u in plane.rotation}, "r", algebra, ONE)
+    squares = _squared(r.values)
+    writer.let("total", call("compensated_dot_pair", r.inward, r.inward, *squares))
+    inverse = writer.let("inverse", Quotient(ONE, Name("total.hi")))
+    rest = sum_of_products([(r.inward, r.inward), *((negative(x), x) for x in r.values.values())])
+    out: dict[Blade, Expression] = {0: Product(rest, inverse)}
+    twice = writer.let("twice", Product(number(2), inverse))
+    factor = writer.let("factor", Product(twice, r.inward))
+    for u, x in r.values.items():
+        out[u] = Product(factor, x)
+    if plane.pitch:
+        q = _scaled(writer, {v: b[v] for v in plane.translation}, "q", algebra)
+        root = writer.let("root", Product(r.inward, q.root_outward))
+        terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+        writer.let("product", call("compensated_dot_pair", *terms))
+        writer.let("ratio", call("double_word_ratio", Name("product"), Name("total")))
+        pitch = writer.let("pitch", Product(number(2), Name("ratio.hi")))
+        pitch_low = writer.let("pitch_low", Product(number(2), Name("ratio.lo")))
+        axis = _axis(plane, r.values)
+        for v, x in q.values.items():
+            moved = MultiplyAdd(pitch_low, axis[v], MultiplyAdd(pitch, axis[v], x))
+            out[v] = Product(Product(Product(twice, moved), root), root)
+        screw = Product(Product(Product(factor, pitch), root), root)
+        out[_quadrivector(plane)] = screw
+    else:
+        for v in plane.translation:
+            out[v] = Product(Product(factor, b[v]), r.inward)
+    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    notes = ("Relative error at most 4 ulp of the result's norm.",)
+    return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace, None, notes)
+
+
+def cayley_inverse_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """(M − 1)(M + 1)⁻¹ for M ~M = 1.
+
+    With M = c + r + q + p: r / (1 + c) for the rotation part.  For c ≤ 0 the same number
+    is (1 − c) r / r², which does not cancel near M = −1.
+    """
+    (parameter,) = parameters_for(operand)
+    value = value_of(parameter)
+    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    writer = Writer()
+    m = _coefficients(writer, algebra, value, "m")
+    cosine = m[0]
+    r = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
+    writer.let("squares", call("compensated_dot_pair", *_squared(r.values)))
+    square = Name("squares.hi")
+    near = Quotient(ONE, Sum(ONE, cosine))
+    far = Quotient(Sum(ONE, negative(cosine)), square)
+    inverse = writer.let("inverse", Select(cosine, near, far))
+    size = writer.let("size", Select(cosine, r.outward, r.inward))
+    out: dict[Blade, Expression] = {
+        u: Product(Product(inverse, x), size) for u, x in r.values.items()
+    }
+    moved = {v: m[v] for v in plane.translation}
+    root: Expression = Select(cosine, ONE, r.root_inward)
+    if plane.pitch:
+        quad = _quadrivector(plane)
+        q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
+        root = Product(root, q.root_outward)
+        terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+        writer.let("product", call("compensated_dot_pair", *terms))
+        writer.let("ratio", call("double_word_ratio", Name("product"), Name("squares")))
+        share, share_low = (
+            writer.let(name, Select(square, Name(f"ratio.{part}"), ZERO))
+            for name, part in (("share", "hi"), ("share_low", "lo"))
+        )
+        terms = [cosine, share, cosine, share_low, q.values[quad], r.outward]
+        along = writer.let("along", negative(call("compensated_dot", *terms)))
+        for v, x in _axis(plane, r.values).items():
+            terms = [x, along, x, share, x, share_low, q.values[v], ONE]
+            moved[v] = call("compensated_dot", *terms)
+    if plane.translation:
+        root = writer.let("root", root)
+        inward = writer.let("inward", Select(cosine, ONE, r.inward))
+    for v, x in moved.items():
+        out[v] = Product(Product(Product(Product(x, root), inverse), inward), root)
+    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    law = "(M − 1)(M + 1)⁻¹, M ~M = 1"
+    notes = (
+        "Relative error at most 4 ulp of the result's norm.  Infinite or not a number at M = −1,",
+        "which no finite bivector reaches.",
+    )
+    return Kernel("cayley_inverse", law, program, None, namespace, None, notes)
+
+
+def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
+    """M (~M M)^(−1/2): the unit versor nearest to M, with ~M M = N² + 2 e I."""
+    (parameter,) = parameters_for(operand)
+    value = value_of(parameter)
+    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    writer = Writer()
+    m = _coefficients(writer, algebra, value, "m")
+    r = _scaled(writer, {u: m[u] for u in (0, *plane.rotation)}, "r", algebra)
+    square = writer.let("square", sum_of_products([(x, x) for x in r.values.values()]))
+    inverse = writer.let("inverse", Quotient(ONE, call("sqrt", square)))
+    out: dict[Blade, Expression] = {u: Product(inverse, x) for u, x in r.values.items()}
+    if plane.translation:
+        quads = [_quadrivector(plane)] if plane.pitch else []
+        q = _scaled(writer, {v: m[v] for v in (*plane.translation, *quads)}, "q", algebra)
+        root = writer.let("root", Product(r.root_inward, q.root_outward))
+        moved = q.values
+        if plane.pitch:
+            quad = _quadrivector(plane)
+            products = [(negative(x), q.values[v]) for x, v in _pairs(plane, r.values)]
+            defect = sum_of_products([(r.values[0], q.values[quad]), *products])
+            slip = negative(writer.let("slip", Quotient(defect, square)))
+            across = _axis(plane, r.values) | {quad: r.values[0]}
+            moved = {v: MultiplyAdd(slip, across[v], x) for v, x in moved.items()}
+        for v, x in moved.items():
+            out[v] = Product(Product(Product(x, inverse), root), root)
+    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    law = "M (~M M)^(−1/2): the unit versor nearest to M"
+    notes = ("Relative error at most 4 ulp of the result's norm, unless M has no rotor part.",)
+    return Kernel("normalize", law, program, None, "", None, notes)
+
+
 __all__ = [
+    "cayley_inverse_kernel",
+    "cayley_kernel",
     "exp_kernel",
     "log_kernel",
+    "normalize_kernel",
 ]

@@ -148,16 +148,35 @@ template <class S>
   return result;
 }
 
-/// A power of two that brings numbers of size `largest` to where squares and products neither
-/// overflow nor vanish: 1 almost always.
+/// Powers of two that bring numbers of a size into and out of the range where their squares and
+/// products neither overflow nor lose digits: all 1 almost always.  The roots are for factors that
+/// would themselves overflow: x `out` = (x `root_out`) `root_out`.
 template <class S>
-[[nodiscard]] constexpr S range_scale(const S& largest) noexcept {
+struct Scaling {
+  S in;
+  S out;
+  S root_in;
+  S root_out;
+};
+
+/// The scaling for numbers of which `largest` has the largest absolute value; denormal or not.
+template <class S>
+[[nodiscard]] constexpr Scaling<S> scaling(const S& largest) noexcept {
   constexpr int half = std::numeric_limits<S>::max_exponent / 2;
-  constexpr S large = power_of_two<S>(half - 12);
+  constexpr int shrink = half + 4;
+  constexpr int grow = half + 2 * std::numeric_limits<S>::digits;
+  constexpr S large = power_of_two<S>(half - 4);
   constexpr S small = power_of_two<S>(12 - half);
-  constexpr S shrink = power_of_two<S>(-half - 12);
-  constexpr S grow = power_of_two<S>(half + 12);
-  return select(largest > large, shrink, select(largest < small, grow, S(1)));
+  constexpr Scaling<S> from_large{power_of_two<S>(-shrink), power_of_two<S>(shrink),
+                                  power_of_two<S>(-shrink / 2), power_of_two<S>(shrink / 2)};
+  constexpr Scaling<S> from_small{power_of_two<S>(grow), power_of_two<S>(-grow),
+                                  power_of_two<S>(grow / 2), power_of_two<S>(-grow / 2)};
+  const auto choose = [&](const S& if_large, const S& if_small) {
+    return select(largest > large, if_large, select(largest < small, if_small, S(1)));
+  };
+  return {choose(from_large.in, from_small.in), choose(from_large.out, from_small.out),
+          choose(from_large.root_in, from_small.root_in),
+          choose(from_large.root_out, from_small.root_out)};
 }
 
 /// The rounding error of a product: a b = product + product_error exactly (barring underflow).
@@ -219,11 +238,13 @@ template <class S>
   return two_sum(root, correction);
 }
 
-/// x / scale for a power of two, exact barring underflow.
+/// x times a power of two; what would overflow becomes the largest number.
 template <class S>
-[[nodiscard]] constexpr DoubleWord<S> double_word_unscale(const DoubleWord<S>& x,
-                                                          const S& scale) noexcept {
-  return {x.hi / scale, x.lo / scale};
+[[nodiscard]] constexpr DoubleWord<S> double_word_scaled(const DoubleWord<S>& x,
+                                                         const S& power) noexcept {
+  constexpr S largest = std::numeric_limits<S>::max();
+  const S hi = x.hi * power;
+  return {select(hi > largest, largest, hi), x.lo * power};
 }
 
 /// a / b of double-word numbers, to about twice the working precision.
@@ -232,15 +253,26 @@ template <class S>
                                                         const DoubleWord<S>& b) noexcept {
   const S quotient = a.hi / b.hi;
   const S rest = -product_error(quotient, b.hi, a.hi);
-  return {quotient, (rest + a.lo - quotient * b.lo) / b.hi};
+  return two_sum(quotient, (rest + a.lo - quotient * b.lo) / b.hi);
 }
 
-/// sin and cos of a double-word angle, each as accurate as the scalar's own sin and cos.
+/// sin and cos of a double-word angle, each as accurate as the scalar's own sin and cos up to
+/// angles of about 1/(8 ε); beyond, of an angle that agrees in its leading word.
 template <class S>
 [[nodiscard]] constexpr Turn<S> sin_cos(const DoubleWord<S>& angle) noexcept {
   const S sine = sin(angle.hi);
   const S cosine = cos(angle.hi);
-  return {mul_add(angle.lo, cosine, sine), mul_add(-angle.lo, sine, cosine)};
+  // At most 1/16 up to angles of 1/(8 ε): four terms of each series are enough.
+  const S lo = select(abs(angle.lo) < S(0.75), angle.lo, S(0));
+  const S square = lo * lo;
+  const S sine_tail =
+      mul_add(square, mul_add(square, S(-1) / S(5040), S(1) / S(120)), S(-1) / S(6));
+  const S cosine_tail =
+      mul_add(square, mul_add(square, S(1) / S(40320), S(-1) / S(720)), S(1) / S(24));
+  const S sine_lo = mul_add(lo * square, sine_tail, lo);
+  const S cosine_lo_less_1 = square * mul_add(square, cosine_tail, S(-1) / S(2));
+  return {mul_add(sine_lo, cosine, mul_add(cosine_lo_less_1, sine, sine)),
+          mul_add(-sine_lo, sine, mul_add(cosine_lo_less_1, cosine, cosine))};
 }
 
 }  // namespace scalar
