@@ -176,19 +176,20 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 43 mul, 5 add (2 fused), 9 div, 1 atan2, 10 compensated_dot, 2 max_abs, 1 pi, 2 scaling,
-/// 18 select, 2 sqrt.
+/// Cost: 43 mul, 5 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 6 compensated_dot_pair, 1
+/// double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
   const S r_e23 = r_scaling.in * m.e23;
-  const S square = scalar::compensated_dot(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
-  const S length = scalar::sqrt(square);
-  const S sine = length * r_scaling.out;
+  const auto squares = scalar::compensated_dot_pair(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
+  const auto root_of_squares = scalar::double_word_sqrt(squares);
+  const S sine = root_of_squares.hi * r_scaling.out;
   const S angle = scalar::atan2(sine, m.s);
-  const S stretch = select(length > S(0), select(m.s > S(0), angle / sine, angle / length), S(0));
+  const S stretch = select(root_of_squares.hi > S(0),
+                           select(m.s > S(0), angle / sine, angle / root_of_squares.hi), S(0));
   const S half_turn = select(-m.s > S(0), scalar::pi<S>(), S(0));
   const S straight = S(1) / m.s;
   const auto q_scaling = scalar::scaling(scalar::max_abs(m.e01, m.e02, m.e03, m.e0123));
@@ -197,38 +198,43 @@ template <class S>
   const S q_e03 = q_scaling.in * m.e03;
   const S q_e0123 = q_scaling.in * m.e0123;
   const S root = select(m.s > S(0), q_scaling.root_out, r_scaling.root_in * q_scaling.root_out);
-  const S norm2 = scalar::compensated_dot(m.s, m.s, square * r_scaling.out, r_scaling.out);
+  const auto inverse = scalar::double_word_reciprocal(squares);
+  const auto overlap = scalar::compensated_dot_pair(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01);
+  const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
+                                                  overlap.lo, inverse.hi);
+  const S norm2 = scalar::compensated_dot(m.s, m.s, squares.hi * r_scaling.out, r_scaling.out);
   const S along =
-      -scalar::compensated_dot(
-          m.s,
-          select(length > S(0),
-                 scalar::compensated_dot(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01) / square, S(0)),
-          q_e0123, r_scaling.out) /
-      norm2;
-  const S n_e02 = scalar::compensated_dot(-r_e12, q_e01, r_e23, q_e03) / square;
-  const S n_e01 = scalar::compensated_dot(r_e12, q_e02, r_e13, q_e03) / square;
-  const S n_e03 = scalar::compensated_dot(-r_e13, q_e01, -r_e23, q_e02) / square;
+      -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e0123, r_scaling.out) / norm2;
+  const auto moment_e02 = scalar::compensated_dot_pair(-r_e12, q_e01, r_e23, q_e03);
+  const S n_e02 = scalar::compensated_dot(moment_e02.hi, inverse.hi, moment_e02.hi, inverse.lo,
+                                          moment_e02.lo, inverse.hi);
+  const auto moment_e01 = scalar::compensated_dot_pair(r_e12, q_e02, r_e13, q_e03);
+  const S n_e01 = scalar::compensated_dot(moment_e01.hi, inverse.hi, moment_e01.hi, inverse.lo,
+                                          moment_e01.lo, inverse.hi);
+  const auto moment_e03 = scalar::compensated_dot_pair(-r_e13, q_e01, -r_e23, q_e02);
+  const S n_e03 = scalar::compensated_dot(moment_e03.hi, inverse.hi, moment_e03.hi, inverse.lo,
+                                          moment_e03.lo, inverse.hi);
   const S q_length = scalar::sqrt(dot(q_e01, q_e01, q_e02, q_e02, q_e03, q_e03));
   const S turn = select(q_length > S(0), half_turn / q_length, S(0));
   return {
-      .w23 = S(-2) * select(length > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
+      .w23 = S(-2) * select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
                             select(q_length > S(0), turn * q_e01, S(0))),
-      .w31 = S(2) * select(length > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
+      .w31 = S(2) * select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
                            select(q_length > S(0), turn * -q_e02, S(0))),
-      .w12 = S(-2) * select(length > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
+      .w12 = S(-2) * select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
                             select(q_length > S(0), turn * q_e03, half_turn)),
       .v1 = S(-2) *
-            select(length > S(0),
+            select(root_of_squares.hi > S(0),
                    stretch * -scalar::compensated_dot(r_e12, n_e02, r_e13, n_e03) * root * root +
                        along * -r_e23 * q_scaling.out,
                    straight * m.e01),
       .v2 = S(-2) *
-            select(length > S(0),
+            select(root_of_squares.hi > S(0),
                    stretch * -scalar::compensated_dot(-r_e12, n_e01, r_e23, n_e03) * root * root +
                        along * r_e13 * q_scaling.out,
                    straight * m.e02),
       .v3 = S(-2) *
-            select(length > S(0),
+            select(root_of_squares.hi > S(0),
                    stretch * -scalar::compensated_dot(-r_e13, n_e01, -r_e23, n_e02) * root * root +
                        along * -r_e12 * q_scaling.out,
                    straight * m.e03)};

@@ -24,6 +24,7 @@ PAIRS = {
     "compensated_dot_pair",
     "double_word_sqrt",
     "double_word_ratio",
+    "double_word_reciprocal",
     "double_word_scaled",
     "scaling",
     "sin_cos",

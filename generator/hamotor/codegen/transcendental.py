@@ -232,10 +232,16 @@ def _commutator(
     return result
 
 
-def _sum_of_two(terms: Sequence[tuple[Expression, Expression]]) -> Expression:
-    """a b + c d, right to an ulp of itself whatever cancels."""
-    (a, b), (c, d) = terms
-    return call("compensated_dot", a, b, c, d)
+def _part(pair: Expression, part: str) -> Name:
+    """The `hi` or `lo` of a named double-word number."""
+    assert isinstance(pair, Name)
+    return Name(f"{pair.text}.{part}")
+
+
+def _double_word_product(a: Expression, b: Expression) -> tuple[Expression, ...]:
+    """Terms whose sum of products is a b, but for the product of the low words."""
+    (a_hi, a_lo), (b_hi, b_lo) = ((_part(x, "hi"), _part(x, "lo")) for x in (a, b))
+    return a_hi, b_hi, a_hi, b_lo, a_lo, b_hi
 
 
 def exp_kernel(
@@ -304,8 +310,9 @@ def log_kernel(
     m = _coefficients(writer, algebra, value, "m")
     cosine = m[0]
     r = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
-    square = writer.let("square", call("compensated_dot", *_squared(r.values)))
-    length = writer.let("length", call("sqrt", square))
+    squares = writer.let("squares", call("compensated_dot_pair", *_squared(r.values)))
+    writer.let("root_of_squares", call("double_word_sqrt", squares))
+    length = Name("root_of_squares.hi")
     sine = writer.let("sine", Product(length, r.outward))
     angle = writer.let("angle", call("atan2", sine, cosine))
     # θ / sin θ itself where it is moderate; else scaled, and applied in steps that stay in range.
@@ -327,9 +334,6 @@ def log_kernel(
 
     straight = writer.let("straight", Quotient(ONE, cosine))
     moved = {v: m[v] for v in plane.translation}
-    if plane.pitch:
-        quad = _quadrivector(plane)
-        q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
     if not plane.pitch:
         root = writer.let("root", Select(cosine, ONE, r.root_inward))
         size = writer.let("q_size", call("max_abs", *moved.values()))
@@ -344,21 +348,29 @@ def log_kernel(
         program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
         return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
+    quad = _quadrivector(plane)
+    q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
     root = writer.let(
         "root", Select(cosine, q.root_outward, Product(r.root_inward, q.root_outward))
     )
-    pairs = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
-    dot = call("compensated_dot", *pairs)
-    share = Select(length, Quotient(dot, square), ZERO)
-    sine2 = Product(square, r.outward), r.outward
+    inverse = writer.let("inverse", call("double_word_reciprocal", squares))
+    terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+    overlap = writer.let("overlap", call("compensated_dot_pair", *terms))
+    share = writer.let(
+        "share", call("compensated_dot_pair", *_double_word_product(overlap, inverse))
+    )
+    parts = [x for part in ("hi", "lo") for x in (cosine, _part(share, part))]
+    lengthwise = call("compensated_dot", *parts, q.values[quad], r.outward)
+    sine2 = Product(_part(squares, "hi"), r.outward), r.outward
     norm2 = writer.let("norm2", call("compensated_dot", cosine, cosine, *sine2))
-    lengthwise = call("compensated_dot", cosine, share, q.values[quad], r.outward)
     along = writer.let("along", Quotient(negative(lengthwise), norm2))
     q_moved = {v: q.values[v] for v in moved}
-    normal = {
-        blade: writer.let(f"n_{algebra.blade_name(blade)}", Quotient(_sum_of_two(terms), square))
-        for blade, terms in _commutator(algebra, r.values, q_moved).items()
-    }
+    normal = {}
+    for blade, ((a, b), (c, d)) in _commutator(algebra, r.values, q_moved).items():
+        name = algebra.blade_name(blade)
+        exact = writer.let(f"moment_{name}", call("compensated_dot_pair", a, b, c, d))
+        product = call("compensated_dot", *_double_word_product(exact, inverse))
+        normal[blade] = writer.let(f"n_{name}", product)
     axis = _axis(plane, r.values)
     double = _commutator(algebra, r.values, normal)
     # −T turns by π about the direction of its translation.
@@ -370,7 +382,8 @@ def log_kernel(
         about: Expression = Product(turn, signed(-sign, q.values[blade]))
         about = Select(q_length, about, half_turn if u == first else ZERO)
         out[u] = Select(length, out[u], about)
-        part = Product(stretch, negative(_sum_of_two(double[blade])))
+        (a, b), (c, d) = double[blade]
+        part = Product(stretch, negative(call("compensated_dot", a, b, c, d)))
         across = Product(Product(part, root), root)
         moved_along = Product(Product(along, x), q.outward)
         out[blade] = Select(length, Sum(across, moved_along), Product(straight, m[blade]))

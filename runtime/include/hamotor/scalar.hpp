@@ -247,6 +247,14 @@ template <class S>
   return {select(hi > largest, largest, hi), x.lo * power};
 }
 
+/// 1 / x of a double-word number, to about twice the working precision.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_reciprocal(const DoubleWord<S>& x) noexcept {
+  const S quotient = S(1) / x.hi;
+  const S rest = -product_error(quotient, x.hi, S(1)) - quotient * x.lo;
+  return two_sum(quotient, quotient * rest);
+}
+
 /// a / b of double-word numbers, to about twice the working precision.
 template <class S>
 [[nodiscard]] constexpr DoubleWord<S> double_word_ratio(const DoubleWord<S>& a,
