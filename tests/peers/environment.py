@@ -1,0 +1,99 @@
+"""Where the peers are installed: an environment of their own, apart from what Hamotor needs.
+
+`python -m tests.peers.environment` installs them; `./hamotor test --with-peers` does so first.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).parent
+FOLDER = ROOT / ".hamotor" / "peers"
+INSTALL = "./hamotor test --with-peers"
+
+PYTHON = FOLDER / "python" / "bin" / "python"
+NODE_MODULES = FOLDER / "node" / "node_modules"
+_PYTHON_PINS = (HERE / "requirements.txt",)
+_NODE_PINS = (HERE / "package.json", HERE / "package-lock.json")
+
+
+def has_python_peers() -> bool:
+    """Whether clifford, kingdon and galgebra are installed, as pinned."""
+    return _stamp("python") == _digest(_PYTHON_PINS)
+
+
+def has_node_peers() -> bool:
+    """Whether ganja.js is installed, as pinned, and there is a node to run it."""
+    return shutil.which("node") is not None and _stamp("node") == _digest(_NODE_PINS)
+
+
+def install() -> list[str]:
+    """Install what is missing; returns why what is still missing could not be."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with (FOLDER / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return [*_install_python(), *_install_node()]
+
+
+def _install_python() -> list[str]:
+    if has_python_peers():
+        return []
+    folder = FOLDER / "python"
+    shutil.rmtree(folder, ignore_errors=True)
+    pip = (str(PYTHON), "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    return _run_all(
+        "clifford, kingdon and galgebra",
+        (
+            (sys.executable, "-m", "venv", str(folder)),
+            (*pip, "--only-binary=:all:", "--requirement", str(_PYTHON_PINS[0])),
+        ),
+        folder,
+        _PYTHON_PINS,
+    )
+
+
+def _install_node() -> list[str]:
+    if has_node_peers():
+        return []
+    if missing := [tool for tool in ("node", "npm") if shutil.which(tool) is None]:
+        return [f"ganja.js: no such command: {', '.join(missing)}"]
+    folder = FOLDER / "node"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    for path in _NODE_PINS:
+        shutil.copy(path, folder)
+    install = ("npm", "ci", "--prefix", str(folder), "--ignore-scripts", "--no-audit", "--no-fund")
+    return _run_all("ganja.js", (install,), folder, _NODE_PINS)
+
+
+def _run_all(
+    peers: str, commands: Iterable[tuple[str, ...]], folder: Path, pins: tuple[Path, ...]
+) -> list[str]:
+    for command in commands:
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            last = (done.stderr or done.stdout).strip().splitlines()[-1:] or ["no output"]
+            return [f"{peers}: {' '.join(command)}: {last[0]}"]
+    (folder / "stamp").write_text(_digest(pins), encoding="utf-8")
+    return []
+
+
+def _digest(paths: Iterable[Path]) -> str:
+    return hashlib.sha256(b"\0".join(path.read_bytes() for path in paths)).hexdigest()
+
+
+def _stamp(part: str) -> str:
+    stamp = FOLDER / part / "stamp"
+    return stamp.read_text(encoding="utf-8") if stamp.is_file() else ""
+
+
+if __name__ == "__main__":
+    if problems := install():
+        sys.exit("\n".join(problems))
