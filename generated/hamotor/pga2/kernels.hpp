@@ -16,7 +16,7 @@ using hamotor::select;
 
 /// gp: Motor Motor -> Motor
 /// a b, the geometric product.
-/// Cost: 12 mul, 8 add (8 fused).  Sparsity: 12 of 16 pairs of components.
+/// Cost: 12 mul, 8 add (6 fused).  Sparsity: 12 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& a, const Motor<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e12, b.e12),
@@ -63,7 +63,7 @@ template <class S>
 
 /// gp: Even Even -> Even
 /// a b, the geometric product.
-/// Cost: 12 mul, 8 add (8 fused).  Sparsity: 12 of 16 pairs of components.
+/// Cost: 12 mul, 8 add (6 fused).  Sparsity: 12 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e12, b.e12),

@@ -16,7 +16,7 @@ using hamotor::select;
 
 /// gp: Motor Motor -> Motor
 /// a b, the geometric product.
-/// Cost: 48 mul, 40 add (40 fused).  Sparsity: 48 of 64 pairs of components.
+/// Cost: 48 mul, 40 add (32 fused).  Sparsity: 48 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& a, const Motor<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
@@ -35,7 +35,7 @@ template <class S>
 
 /// gp: Rotor Rotor -> Rotor
 /// a b, the geometric product.
-/// Cost: 16 mul, 12 add (12 fused).  Sparsity: 16 of 16 pairs of components.
+/// Cost: 16 mul, 12 add (8 fused).  Sparsity: 16 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> gp(const Rotor<S>& a, const Rotor<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
@@ -46,7 +46,7 @@ template <class S>
 
 /// gp: Motor Rotor -> Motor
 /// a b, the geometric product.
-/// Cost: 32 mul, 24 add (24 fused).  Sparsity: 32 of 32 pairs of components.
+/// Cost: 32 mul, 24 add (16 fused).  Sparsity: 32 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& m, const Rotor<S>& r) noexcept {
   return {.s = dot(m.s, r.s, -m.e23, r.e23, -m.e31, r.e31, -m.e12, r.e12),
@@ -61,7 +61,7 @@ template <class S>
 
 /// gp: Rotor Motor -> Motor
 /// a b, the geometric product.
-/// Cost: 32 mul, 24 add (24 fused).  Sparsity: 32 of 32 pairs of components.
+/// Cost: 32 mul, 24 add (16 fused).  Sparsity: 32 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Rotor<S>& r, const Motor<S>& m) noexcept {
   return {.s = dot(m.s, r.s, -m.e23, r.e23, -m.e31, r.e31, -m.e12, r.e12),
@@ -76,7 +76,7 @@ template <class S>
 
 /// gp: Motor Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 36 mul, 28 add (28 fused).  Sparsity: 36 of 48 pairs of components.
+/// Cost: 36 mul, 28 add (24 fused).  Sparsity: 36 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Motor<S>& m,
                                                   const Bivector<S>& b) noexcept {
@@ -96,7 +96,7 @@ template <class S>
 
 /// gp: Bivector Motor -> Even
 /// a b, the geometric product.
-/// Cost: 36 mul, 28 add (28 fused).  Sparsity: 36 of 48 pairs of components.
+/// Cost: 36 mul, 28 add (24 fused).  Sparsity: 36 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Bivector<S>& b,
                                                   const Motor<S>& m) noexcept {
@@ -116,7 +116,7 @@ template <class S>
 
 /// gp: Bivector Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 27 mul, 19 add (19 fused).  Sparsity: 27 of 36 pairs of components.
+/// Cost: 27 mul, 19 add (15 fused).  Sparsity: 27 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Bivector<S>& a,
                                                   const Bivector<S>& b) noexcept {
@@ -133,7 +133,7 @@ template <class S>
 
 /// gp: Even Even -> Even
 /// a b, the geometric product.
-/// Cost: 48 mul, 40 add (40 fused).  Sparsity: 48 of 64 pairs of components.
+/// Cost: 48 mul, 40 add (32 fused).  Sparsity: 48 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
@@ -182,7 +182,7 @@ template <class S>
 
 /// gp: Even Plane -> Odd
 /// a b, the geometric product.
-/// Cost: 28 mul, 20 add (20 fused).  Sparsity: 28 of 32 pairs of components.
+/// Cost: 28 mul, 20 add (16 fused).  Sparsity: 28 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Odd<S> gp(const Even<S>& a, const Plane<S>& p) noexcept {
   return {.e0 = dot(a.s, p.e0, a.e01, p.e1, a.e02, p.e2, a.e03, p.e3),
@@ -197,7 +197,7 @@ template <class S>
 
 /// gp: Even Trivector -> Odd
 /// a b, the geometric product.
-/// Cost: 20 mul, 12 add (12 fused).  Sparsity: 20 of 32 pairs of components.
+/// Cost: 20 mul, 12 add (8 fused).  Sparsity: 20 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Odd<S> gp(const Even<S>& a, const Trivector<S>& t) noexcept {
   return {.e0 = dot(a.e23, t.e032, a.e31, t.e013, a.e12, t.e021, -a.e0123, t.e123),
@@ -281,7 +281,7 @@ template <class S>
 
 /// outer: Bivector Bivector -> Pseudoscalar
 /// a ∧ b.
-/// Cost: 6 mul, 5 add (5 fused).  Sparsity: 6 of 36 pairs of components.
+/// Cost: 6 mul, 5 add (4 fused).  Sparsity: 6 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Bivector<S>& a,
                                                              const Bivector<S>& b) noexcept {
@@ -291,7 +291,7 @@ template <class S>
 
 /// outer: Plane Trivector -> Pseudoscalar
 /// a ∧ b.
-/// Cost: 4 mul, 3 add (3 fused).  Sparsity: 4 of 16 pairs of components.
+/// Cost: 4 mul, 3 add (2 fused).  Sparsity: 4 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Plane<S>& p,
                                                              const Trivector<S>& t) noexcept {
@@ -366,7 +366,7 @@ template <class S>
 
 /// regressive: Bivector Bivector -> Scalar
 /// a ∨ b, the join in PGA: (a ∨ b)* = a* ∧ b*.
-/// Cost: 6 mul, 5 add (5 fused).  Sparsity: 6 of 36 pairs of components.
+/// Cost: 6 mul, 5 add (4 fused).  Sparsity: 6 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S regressive(const Bivector<S>& a,
                                                     const Bivector<S>& b) noexcept {
@@ -450,7 +450,7 @@ template <class S>
 
 /// commutator: Bivector Bivector -> Bivector
 /// a × b = ½(a b − b a).
-/// Cost: 18 mul, 12 add (12 fused).  Sparsity: 18 of 36 pairs of components.
+/// Cost: 18 mul, 12 add (9 fused).  Sparsity: 18 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> commutator(const Bivector<S>& a,
                                                               const Bivector<S>& b) noexcept {
@@ -511,7 +511,7 @@ template <class S>
 /// sandwich: Motor Point -> Point
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 21 mul, 18 add (18 fused).
+/// Cost: 21 mul, 18 add (15 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Motor<S>& m,
                                                          const Point<S>& x) noexcept {
@@ -530,7 +530,7 @@ template <class S>
 /// sandwich: Motor Origin -> Point
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 15 mul, 9 add (9 fused).
+/// Cost: 15 mul, 9 add (6 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Motor<S>& m,
                                                          const Origin<S>& /*o*/) noexcept {
@@ -557,7 +557,7 @@ template <class S>
 /// sandwich: Motor Trivector -> Trivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 25 mul, 18 add (18 fused).
+/// Cost: 25 mul, 18 add (15 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> sandwich(const Motor<S>& m,
                                                              const Trivector<S>& t) noexcept {
@@ -575,7 +575,7 @@ template <class S>
 /// sandwich: Motor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 51 mul, 39 add (39 fused).
+/// Cost: 51 mul, 39 add (33 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Motor<S>& m,
                                                             const Bivector<S>& b) noexcept {
@@ -605,7 +605,7 @@ template <class S>
 /// sandwich: Motor Plane -> Plane
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 32 mul, 21 add (21 fused).
+/// Cost: 32 mul, 21 add (20 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Plane<S> sandwich(const Motor<S>& m,
                                                          const Plane<S>& p) noexcept {
@@ -828,7 +828,7 @@ template <class S>
 
 /// norm_squared: Motor -> Scalar
 /// <a ~a>₀.
-/// Cost: 4 mul, 3 add (3 fused).
+/// Cost: 4 mul, 3 add (2 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S norm_squared(const Motor<S>& m) noexcept {
   return dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
@@ -836,7 +836,7 @@ template <class S>
 
 /// norm_squared: Rotor -> Scalar
 /// <a ~a>₀.
-/// Cost: 4 mul, 3 add (3 fused).
+/// Cost: 4 mul, 3 add (2 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S norm_squared(const Rotor<S>& r) noexcept {
   return dot(r.s, r.s, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12);
@@ -968,7 +968,7 @@ template <class S>
 /// cayley: Bivector -> Motor
 /// (1 + B)(1 − B)⁻¹.
 /// Relative error at most 4 ulp of the result's norm.
-/// Cost: 37 mul, 9 add (9 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
+/// Cost: 37 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
@@ -1043,7 +1043,7 @@ template <class S>
 /// normalize: Motor -> Motor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
-/// Cost: 37 mul, 10 add (10 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
+/// Cost: 37 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
@@ -1073,7 +1073,7 @@ template <class S>
 /// normalize: Rotor -> Rotor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
-/// Cost: 12 mul, 3 add (3 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
+/// Cost: 12 mul, 3 add (2 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.s, r.e12, -r.e31, r.e23));

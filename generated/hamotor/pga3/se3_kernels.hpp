@@ -17,7 +17,7 @@ using hamotor::select;
 
 /// ad: Rate Rate -> Rate
 /// ad_a b = [a, b] = a b − b a.
-/// Cost: 18 mul, 12 add (12 fused).  Sparsity: 18 of 36 pairs of components.
+/// Cost: 18 mul, 12 add (9 fused).  Sparsity: 18 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> ad(const se3::Rate<S>& a,
                                                        const se3::Rate<S>& b) noexcept {
@@ -31,7 +31,7 @@ template <class S>
 
 /// coadjoint: Rate Momentum -> Momentum
 /// ad*_w μ = [μ, w], so that (ad*_w μ)(b) = μ([w, b]).
-/// Cost: 18 mul, 12 add (12 fused).  Sparsity: 18 of 36 pairs of components.
+/// Cost: 18 mul, 12 add (9 fused).  Sparsity: 18 of 36 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> coadjoint(
     const se3::Rate<S>& w, const se3::Momentum<S>& mu) noexcept {
@@ -45,7 +45,7 @@ template <class S>
 
 /// kinematics: Motor Rate -> Motor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 44 mul, 28 add (28 fused).  Sparsity: 36 of 48 pairs of components.
+/// Cost: 44 mul, 28 add (24 fused).  Sparsity: 36 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> kinematics(const Motor<S>& m,
                                                            const se3::Rate<S>& w) noexcept {
@@ -66,7 +66,7 @@ template <class S>
 /// Ad: Motor Rate -> Rate
 /// m w ~m: a body rate as a spatial rate.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 51 mul, 39 add (39 fused).
+/// Cost: 51 mul, 39 add (33 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> Ad(const Motor<S>& m,
                                                        const se3::Rate<S>& w) noexcept {
@@ -96,7 +96,7 @@ template <class S>
 /// Ad_star_inverse: Motor Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 51 mul, 39 add (39 fused).
+/// Cost: 51 mul, 39 add (33 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> Ad_star_inverse(
     const Motor<S>& m, const se3::Momentum<S>& mu) noexcept {
@@ -125,7 +125,7 @@ template <class S>
 
 /// pairing: Momentum Rate -> Scalar
 /// μ(w) = (μ ∧ w) / I: twice the kinetic energy if w is the rate of μ.
-/// Cost: 6 mul, 5 add (5 fused).
+/// Cost: 6 mul, 5 add (4 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S pairing(const se3::Momentum<S>& mu,
                                                  const se3::Rate<S>& w) noexcept {
@@ -243,7 +243,7 @@ template <class S>
 /// cayley: Rate -> Motor
 /// (1 + B)(1 − B)⁻¹.
 /// Relative error at most 4 ulp of the result's norm.
-/// Cost: 43 mul, 9 add (9 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
+/// Cost: 43 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {

@@ -138,7 +138,7 @@ template <class S>
 /// cayley: Rate -> Rotor
 /// (1 + B)(1 − B)⁻¹.
 /// Relative error at most 4 ulp of the result's norm.
-/// Cost: 16 mul, 3 add (3 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
+/// Cost: 16 mul, 3 add (2 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;

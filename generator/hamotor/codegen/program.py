@@ -173,8 +173,10 @@ class Program:
     def cost(self) -> Cost:
         """Operation count by kind."""
         total = Cost()
-        for node in self.nodes():
-            total = total + _node_cost(node)
+        for _, expression in (*self.bindings, *self.outputs):
+            for node in walk(expression):
+                total = total + _node_cost(node)
+            total = total + Cost(fused=-_split_sums(expression))
         return total
 
     def nodes(self) -> Iterator[Expression]:
@@ -229,6 +231,26 @@ def _node_cost(node: Expression) -> Cost:
             return Cost(calls={"select": 1})
         case _:
             return Cost()
+
+
+def _split_sums(expression: Expression, inside: bool = False) -> int:
+    """How many chains of multiply-adds `dot` does as two sums, which it adds without fusing.
+
+    Those are the sums of four products or more and of nothing else (runtime, scalar.hpp).
+    inside: the expression is the rest of a longer chain.
+    """
+    found = 0
+    if isinstance(expression, MultiplyAdd) and not inside:
+        products = 0
+        rest: Expression = expression
+        while isinstance(rest, MultiplyAdd):
+            products += 1
+            rest = rest.c
+        found = int(isinstance(rest, Product) and products >= 3)
+    for child in children(expression):
+        in_chain = isinstance(expression, MultiplyAdd) and child is expression.c
+        found += _split_sums(child, in_chain)
+    return found
 
 
 def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomial:
