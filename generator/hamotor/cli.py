@@ -174,6 +174,11 @@ def _parser() -> _Parser:
     )
     test = command("test", "run all checks and tests", _test)
     test.add_argument("--fast", action="store_true", help="leave out what takes long")
+    test.add_argument(
+        "--with-peers",
+        action="store_true",
+        help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
+    )
     return parser
 
 
@@ -422,7 +427,7 @@ def _compare(parsed: argparse.Namespace) -> int:
 def _test(parsed: argparse.Namespace) -> int:
     from hamotor.testing import run_tests
 
-    return run_tests(fast=parsed.fast)
+    return run_tests(fast=parsed.fast, with_peers=parsed.with_peers)
 
 
 def _say(text: str) -> None:

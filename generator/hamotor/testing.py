@@ -37,6 +37,11 @@ class Outcome:
     seconds: float
 
 
+INSTALL_PEERS: Final = Check(
+    "install peers", ((sys.executable, "-P", "tests/peers/environment.py"),)
+)
+
+
 def checks(fast: bool) -> list[Check]:
     """The checks in the order they run; `fast` leaves out clang and the tests marked slow."""
     listed = [
@@ -54,12 +59,14 @@ def checks(fast: bool) -> list[Check]:
     return listed
 
 
-def run_tests(fast: bool) -> int:
+def run_tests(fast: bool, with_peers: bool = False) -> int:
     """Run every check, whatever the ones before it did; 0 if all passed, 1 if any failed.
 
+    with_peers: first install the libraries that kernels are compared with; tests that find none of
+    them are skipped, and say so.
     Raises ToolError before anything runs if a tool is missing.
     """
-    chosen = checks(fast)
+    chosen = [*([INSTALL_PEERS] if with_peers else []), *checks(fast)]
     _require_tools(chosen)
     _forget_moved_builds()
     outcomes = [_run(check) for check in chosen]

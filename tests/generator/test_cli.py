@@ -273,14 +273,15 @@ def test_compare_exits_with_1_above_the_tolerance(
 def test_test_runs_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 
-    def run_tests(fast: bool) -> int:
-        calls.append(fast)
+    def run_tests(fast: bool, with_peers: bool) -> int:
+        calls.append((fast, with_peers))
         return 1
 
     monkeypatch.setattr(testing, "run_tests", run_tests)
     assert main(["test"]) == 1
     assert main(["test", "--fast"]) == 1
-    assert calls == [False, True]
+    assert main(["test", "--with-peers"]) == 1
+    assert calls == [(False, False), (True, False), (False, True)]
 
 
 def test_a_closed_pipe_is_no_error() -> None:

@@ -14,13 +14,14 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "peers: compares with other libraries, if they are there")
 
 
-def _require(name: str, present: bool) -> None:
+def require(name: str, present: bool) -> None:
+    """Skip unless the peer is there."""
     if not present:
         pytest.skip(f"{name} is not installed; `{environment.INSTALL}` installs it")
 
 
 def _python(name: str) -> Iterator[Peer]:
-    _require(name, environment.has_python_peers())
+    require(name, environment.has_python_peers())
     peer = python_peer(name)
     yield peer
     peer.end()
@@ -47,7 +48,7 @@ def galgebra() -> Iterator[Peer]:
 @pytest.fixture(scope="session")
 def ganja() -> Iterator[Peer]:
     """ganja.js."""
-    _require("ganja.js", environment.has_node_peers())
+    require("ganja.js", environment.has_node_peers())
     peer = node_peer("ganja")
     yield peer
     peer.end()
