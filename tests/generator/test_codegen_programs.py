@@ -1,0 +1,209 @@
+"""Programs: they expand to what the algebra says, at pinned costs; C++ and Python agree."""
+
+from __future__ import annotations
+
+import json
+import math
+import subprocess
+from collections.abc import Iterator
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from hamotor.codegen import bundled_algebras, read_algebra
+from hamotor.codegen.kernel import Kernel, proved
+from hamotor.codegen.library import library
+from hamotor.codegen.program import (
+    Cost,
+    Expression,
+    MultiplyAdd,
+    Name,
+    Negative,
+    Number,
+    Product,
+    Program,
+    Quotient,
+    Select,
+    Sum,
+    number,
+    polynomial_expression,
+    sum_of_products,
+)
+from hamotor.codegen.spec import bundled_path
+
+ROOT = Path(__file__).resolve().parents[2]
+LIBRARIES = {name: library(read_algebra(bundled_path(name))) for name in bundled_algebras()}
+KERNELS = [(name, kernel) for name, kernels in LIBRARIES.items() for kernel in kernels]
+
+
+def title(algebra: str, kernel: Kernel) -> str:
+    space = f"{kernel.namespace}::" if kernel.namespace else ""
+    return f"{algebra} {space}{kernel.name} {' '.join(e.name for e in kernel.operands)}"
+
+
+IDS = [title(*k) for k in KERNELS]
+POLYNOMIAL = [k for _, k in KERNELS if k.meaning is not None]
+
+
+@pytest.mark.parametrize(("algebra", "kernel"), KERNELS, ids=IDS)
+def test_a_program_expands_to_what_its_kernel_means(algebra: str, kernel: Kernel) -> None:
+    if kernel.meaning is None:
+        with pytest.raises(ValueError, match="not a polynomial"):
+            kernel.program.expand()
+    else:
+        assert kernel.program.expand() == kernel.meaning, algebra
+
+
+def mutations(expression: Expression) -> Iterator[Expression]:
+    """The expression with one thing wrong: a sign, a name, an operation."""
+    match expression:
+        case Name(text):
+            yield Negative(expression)
+            yield Name(f"{text}_")
+        case Number(value):
+            yield Number(value + 1)
+        case Negative(x):
+            yield x
+        case Sum(a, b):
+            yield Product(a, b)
+            yield from (Sum(x, b) for x in mutations(a))
+        case Product(a, b):
+            yield Sum(a, b)
+            yield from (Product(x, b) for x in mutations(a))
+            yield from (Product(a, x) for x in mutations(b))
+        case MultiplyAdd(a, b, c):
+            yield Product(a, b)
+            yield from (MultiplyAdd(x, b, c) for x in mutations(a))
+            yield from (MultiplyAdd(a, b, x) for x in mutations(c))
+        case _:
+            pass
+
+
+def mutants(program: Program) -> Iterator[Program]:
+    for part in ("bindings", "outputs"):
+        lines = getattr(program, part)
+        for i, (name, expression) in enumerate(lines):
+            for wrong in mutations(expression):
+                changed = (*lines[:i], (name, wrong), *lines[i + 1 :])
+                yield (
+                    replace(program, bindings=changed)
+                    if part == "bindings"
+                    else replace(program, outputs=changed)
+                )
+
+
+def test_every_mutated_program_is_caught() -> None:
+    caught = 0
+    chosen = [k for k in POLYNOMIAL if k.name in ("gp", "sandwich", "Ad", "regressive", "pairing")]
+    for kernel in chosen:
+        for wrong in mutants(kernel.program):
+            with pytest.raises(AssertionError, match="does not expand to its definition"):
+                proved(replace(kernel, program=wrong))
+            caught += 1
+    assert caught > 1000
+
+
+COSTS = {
+    "pga3 gp Motor Motor": (48, 40),
+    "pga3 gp Rotor Rotor": (16, 12),
+    "pga3 gp Motor Bivector": (36, 28),
+    "pga3 commutator Bivector Bivector": (18, 12),
+    "pga3 sandwich Motor Point": (21, 18),
+    "pga3 sandwich Motor Trivector": (25, 18),
+    "pga3 sandwich Motor Direction": (18, 12),
+    "pga3 sandwich Motor Origin": (15, 9),
+    "pga3 sandwich Motor Bivector": (51, 39),
+    "pga3 sandwich Rotor Direction": (18, 12),
+    "pga3 se3::ad Rate Rate": (18, 12),
+    "pga3 se3::coadjoint Rate Momentum": (18, 12),
+    "pga3 se3::pairing Momentum Rate": (6, 5),
+    "pga3 so3::ad Rate Rate": (6, 3),
+    "pga2 gp Motor Motor": (12, 8),
+    "pga2 commutator Bivector Bivector": (4, 2),
+}
+"""Multiplications and additions at most: the lowest published, where there are such."""
+
+
+@pytest.mark.parametrize("name", COSTS)
+def test_costs_are_at_or_below_the_lowest_known(name: str) -> None:
+    costs = {title(*k): k[1].program.cost for k in KERNELS}
+    assert (costs[name].mul, costs[name].add) <= COSTS[name]
+    assert costs[name].add <= COSTS[name][1]
+
+
+def test_the_index_gives_the_programs_costs() -> None:
+    for algebra, kernels in LIBRARIES.items():
+        path = ROOT / "generated" / "hamotor" / algebra / "kernels.json"
+        listed = json.loads(path.read_text("utf-8"))["kernels"]
+        assert [k["name"] for k in listed] == [k.name for k in kernels]
+        assert [k["cost"] for k in listed] == [k.program.cost.as_data() for k in kernels]
+
+
+def test_costs_count_by_kind() -> None:
+    x, y = Name("x"), Name("y")
+    program = Program((), (("z", MultiplyAdd(x, y, Sum(x, Negative(y)))),), (("value", x),), None)
+    assert program.cost == Cost(mul=1, add=2, fused=1)
+    assert str(program.cost) == "1 mul, 2 add (1 fused)"
+    program = replace(program, outputs=(("value", Quotient(Product(x, y), Select(x, y, x))),))
+    assert program.cost.as_data() == {"mul": 2, "add": 2, "fused": 1, "div": 1, "select": 1}
+
+
+def test_sums_of_products_fuse_onto_what_is_not_a_product() -> None:
+    a, b, c = Name("a"), Name("b"), Name("c")
+    assert sum_of_products([(a, b), (c,)]) == MultiplyAdd(a, b, c)
+    assert sum_of_products([(a, b), (b, c)]) == MultiplyAdd(b, c, Product(a, b))
+    assert sum_of_products([]) == number(0)
+    halves = polynomial_expression({("a", "b"): Fraction(1, 2), ("c",): Fraction(-1, 2)})
+    assert halves == Product(number(Fraction(1, 2)), MultiplyAdd(a, b, Negative(c)))
+    with pytest.raises(ValueError, match="more than two factors"):
+        polynomial_expression({("a", "b", "c"): 1})
+
+
+@pytest.mark.slow
+def test_cpp_and_python_evaluate_alike(tmp_path: Path) -> None:
+    """All polynomial kernels of pga3 at one point, in C++ doubles and in Python fractions."""
+    calls = []
+    expected: list[float] = []
+    for kernel in LIBRARIES["pga3"]:
+        if kernel.meaning is None:
+            continue
+        program = kernel.program
+        values = {
+            f"{p.name}.{c.name}": Fraction((7 * i + 3 * j) % 11 - 5, 4)
+            for j, p in enumerate(program.parameters)
+            for i, c in enumerate(p.element.components)
+        }
+        results = program.evaluate(values, {"number": Fraction})
+        expected += [float(x) for x in results.values()]
+        arguments = ", ".join(
+            f"{p.element.cpp_name}<double>{{"
+            + ", ".join(str(float(values[f"{p.name}.{c.name}"])) for c in p.element.components)
+            + "}"
+            for p in program.parameters
+        )
+        space = f"{kernel.namespace}::" if kernel.namespace else ""
+        calls.append(f"print({space}{kernel.name}({arguments}));")
+    code = tmp_path / "alike.cpp"
+    lines = [
+        "#include <cstdio>",
+        '#include "hamotor/pga3/pga3.hpp"',
+        "using namespace hamotor::pga3;",
+        'void print(double x) { std::printf("%.17g\\n", x); }',
+        "template <class T>",
+        "void print(const T& value) {",
+        "  for (double x : value.components()) print(x);",
+        "}",
+        "int main() {",
+        *calls,
+        "}",
+    ]
+    code.write_text("\n".join(lines), "utf-8")
+    folders = [f"-I{ROOT / folder}" for folder in ("generated", "runtime/include")]
+    target = str(tmp_path / "alike")
+    subprocess.run(["g++", "-std=c++20", *folders, str(code), "-o", target], check=True)
+    run = subprocess.run([target], check=True, capture_output=True, text=True)
+    found = [float(line) for line in run.stdout.splitlines()]
+    assert len(found) == len(expected) > 300
+    assert all(math.isclose(a, b, rel_tol=1e-14) for a, b in zip(found, expected, strict=True))
