@@ -1,0 +1,502 @@
+// A contest: operations of rigid-body geometry, each done by several contestants, timed in a
+// dependent chain and over arrays, and compared with itself in __float128.
+//
+// A contestant is a class template C<S> that says how it holds a thing of some kind,
+//   make(kind, exact)  from the pga3 element with __float128 components, rounded to S
+//   exact(kind, held)  and back, without rounding
+// and which operations it knows.  What it does not know is left out.  Every operation is marked to
+// be inlined, so that none is timed with the call that another is spared.
+#pragma once
+
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <random>
+#include <string>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "hamotor/pga3/pga3.hpp"
+#include "hamotor/pga3/se3.hpp"
+#include "quad.hpp"
+
+namespace bench {
+
+namespace pga3 = hamotor::pga3;
+
+/// A free body's motion and momentum.
+template <class S>
+struct Body {
+  pga3::Motor<S> motion;
+  pga3::se3::Momentum<S> momentum;
+};
+
+/// Mass (kg) and principal moments (kg m²) of the body that is stepped, and the step (s).
+inline constexpr double mass = 1.5;
+inline constexpr std::array<double, 3> moments{1.0, 2.0, 3.0};
+inline constexpr double step_size = 0.01;
+
+namespace kind {
+struct Motion {
+  using Exact = pga3::Motor<Quad>;
+};
+struct Point {
+  using Exact = pga3::Point<Quad>;
+};
+struct Direction {
+  using Exact = pga3::Direction<Quad>;
+};
+struct Plane {
+  using Exact = pga3::Plane<Quad>;
+};
+struct Line {
+  using Exact = pga3::Bivector<Quad>;
+};
+struct Bivector {
+  using Exact = pga3::Bivector<Quad>;
+};
+struct Rate {
+  using Exact = pga3::se3::Rate<Quad>;
+};
+struct Momentum {
+  using Exact = pga3::se3::Momentum<Quad>;
+};
+struct Body {
+  using Exact = bench::Body<Quad>;
+};
+struct Nothing {};
+}  // namespace kind
+
+using Values = std::vector<Quad>;
+
+template <class Element>
+[[nodiscard]] Values values(const Element& x) {
+  const auto all = x.components();
+  return Values(all.begin(), all.end());
+}
+
+[[nodiscard]] inline Values values(const Values& x) { return x; }
+
+/// What a motion does: the images of the origin and of the axes.  A motor's sign does not count.
+[[nodiscard]] inline Values values(const pga3::Motor<Quad>& m) {
+  Values all = values(sandwich(m, pga3::Origin<Quad>{}));
+  for (std::size_t k = 0; k < 3; ++k) {
+    std::array<Quad, 3> axis{Quad(0), Quad(0), Quad(0)};
+    axis[k] = Quad(1);
+    for (const Quad x : values(sandwich(m, pga3::Direction<Quad>::from(axis)))) all.push_back(x);
+  }
+  return all;
+}
+
+[[nodiscard]] inline Values values(const Body<Quad>& body) {
+  Values all = values(body.motion);
+  for (const Quad x : values(body.momentum)) all.push_back(x);
+  return all;
+}
+
+/// Random exact things of size 1.
+class Source {
+ public:
+  Quad number(double size = 1.0) {
+    return Quad(std::uniform_real_distribution<double>(-size, size)(engine_));
+  }
+  template <class Element>
+  Element element() {
+    std::array<Quad, Element::size> x{};
+    for (auto& component : x) component = number();
+    return Element::from(x);
+  }
+  kind::Motion::Exact make(kind::Motion) { return exp(make(kind::Rate{})); }
+  kind::Point::Exact make(kind::Point) { return element<pga3::Point<Quad>>(); }
+  kind::Direction::Exact make(kind::Direction) { return element<pga3::Direction<Quad>>(); }
+  kind::Plane::Exact make(kind::Plane) { return element<pga3::Plane<Quad>>(); }
+  kind::Line::Exact make(kind::Line) {
+    return regressive(make(kind::Point{}), make(kind::Direction{}));
+  }
+  /// Angles up to half a turn, spread so that long chains of brackets neither grow nor vanish.
+  kind::Rate::Exact make(kind::Rate) {
+    auto w = element<pga3::se3::Rate<Quad>>();
+    const double angle =
+        M_PI * std::pow(std::uniform_real_distribution<double>(0.0, 1.0)(engine_), 0.8);
+    const Quad factor = Quad(angle) / sqrt(w.w23 * w.w23 + w.w31 * w.w31 + w.w12 * w.w12);
+    w.w23 *= factor;
+    w.w31 *= factor;
+    w.w12 *= factor;
+    return w;
+  }
+  kind::Bivector::Exact make(kind::Bivector) {
+    return pga3::Bivector<Quad>::from(make(kind::Rate{}).components());
+  }
+  kind::Momentum::Exact make(kind::Momentum) { return element<pga3::se3::Momentum<Quad>>(); }
+  kind::Body::Exact make(kind::Body) { return {make(kind::Motion{}), make(kind::Momentum{})}; }
+  kind::Nothing make(kind::Nothing) { return {}; }
+
+ private:
+  std::mt19937_64 engine_{20240229};
+};
+
+namespace operation {
+struct MotorProduct {
+  static constexpr const char* name = "motor product";
+  using A = kind::Motion;
+  using B = kind::Motion;
+  using Result = kind::Motion;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto& a, const auto& b)
+      -> decltype(C::compose(a, b)) {
+    return C::compose(a, b);
+  }
+};
+template <class Kind>
+struct Move {
+  using A = kind::Motion;
+  using B = Kind;
+  using Result = Kind;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto& m, const auto& x)
+      -> decltype(C::move(Kind{}, m, x)) {
+    return C::move(Kind{}, m, x);
+  }
+};
+struct MovePoint : Move<kind::Point> {
+  static constexpr const char* name = "point";
+};
+struct MoveDirection : Move<kind::Direction> {
+  static constexpr const char* name = "direction";
+};
+struct MovePlane : Move<kind::Plane> {
+  static constexpr const char* name = "plane";
+};
+struct MoveLine : Move<kind::Line> {
+  static constexpr const char* name = "line";
+};
+struct Commutator {
+  static constexpr const char* name = "commutator";
+  using A = kind::Bivector;
+  using B = kind::Bivector;
+  using Result = kind::Bivector;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto& a, const auto& b)
+      -> decltype(C::commutator(a, b)) {
+    return C::commutator(a, b);
+  }
+};
+struct Coadjoint {
+  static constexpr const char* name = "coadjoint";
+  using A = kind::Rate;
+  using B = kind::Momentum;
+  using Result = kind::Momentum;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto& w, const auto& mu)
+      -> decltype(C::coadjoint(w, mu)) {
+    return C::coadjoint(w, mu);
+  }
+};
+struct Exp {
+  static constexpr const char* name = "exp";
+  using A = kind::Nothing;
+  using B = kind::Rate;
+  using Result = kind::Motion;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& w) -> decltype(C::exp(w)) {
+    return C::exp(w);
+  }
+};
+struct Log {
+  static constexpr const char* name = "log";
+  using A = kind::Nothing;
+  using B = kind::Motion;
+  using Result = kind::Rate;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& m) -> decltype(C::log(m)) {
+    return C::log(m);
+  }
+};
+struct ExpLog {
+  static constexpr const char* name = "exp of log";
+  using A = kind::Nothing;
+  using B = kind::Motion;
+  using Result = kind::Motion;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& m)
+      -> decltype(C::exp(C::log(m))) {
+    return C::exp(C::log(m));
+  }
+};
+struct Normalize {
+  static constexpr const char* name = "normalize";
+  using A = kind::Nothing;
+  using B = kind::Motion;
+  using Result = kind::Motion;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& m)
+      -> decltype(C::normalize(m)) {
+    return C::normalize(m);
+  }
+};
+/// One step of the classical Runge–Kutta method, of a free body.
+struct RungeKutta {
+  static constexpr const char* name = "RK4 step";
+  using A = kind::Nothing;
+  using B = kind::Body;
+  using Result = kind::Body;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& x)
+      -> decltype(C::runge_kutta(x)) {
+    return C::runge_kutta(x);
+  }
+};
+struct Rkmk4 {
+  static constexpr const char* name = "rkmk4 step";
+  using A = kind::Nothing;
+  using B = kind::Body;
+  using Result = kind::Body;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& x) -> decltype(C::rkmk4(x)) {
+    return C::rkmk4(x);
+  }
+};
+struct Splitting2 {
+  static constexpr const char* name = "splitting2 step";
+  using A = kind::Nothing;
+  using B = kind::Body;
+  using Result = kind::Body;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto&, const auto& x)
+      -> decltype(C::splitting2(x)) {
+    return C::splitting2(x);
+  }
+};
+}  // namespace operation
+
+/// The classical Runge–Kutta method, x + h/6 (k₁ + 2k₂ + 2k₃ + k₄); C::slope(x) is k, and
+/// C::add(x, c, k) is x + c k.
+template <class C, class S, class State>
+[[nodiscard]] HAMOTOR_INLINE inline State classical_runge_kutta(const State& x) {
+  const S h = static_cast<S>(step_size);
+  const State one = C::slope(x);
+  const State two = C::slope(C::add(x, S(0.5) * h, one));
+  const State three = C::slope(C::add(x, S(0.5) * h, two));
+  const State four = C::slope(C::add(x, h, three));
+  const State outer = C::add(C::add(x, h / S(6), one), h / S(6), four);
+  return C::add(C::add(outer, h / S(3), two), h / S(3), three);
+}
+
+/// Largest difference, relative to the largest value.
+[[nodiscard]] inline double relative_difference(const Values& a, const Values& b) {
+  Quad difference(0);
+  Quad size(0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Quad d = abs(a[i] - b[i]);
+    if (!(d <= difference)) difference = d;
+    if (abs(b[i]) > size) size = abs(b[i]);
+  }
+  return static_cast<double>(difference / size);
+}
+
+struct Nothing {};
+
+template <class C, class Kind>
+[[nodiscard]] auto make(Kind kind, const typename Kind::Exact& x) -> decltype(C::make(kind, x)) {
+  return C::make(kind, x);
+}
+template <class C>
+[[nodiscard]] Nothing make(kind::Nothing, const kind::Nothing&) {
+  return {};
+}
+
+template <class C, class Kind>
+using Held = decltype(make<C>(Kind{}, std::declval<Source&>().make(Kind{})));
+
+/// The same numbers in __float128.  Everything held is numbers and, at its end, padding.
+template <class Wide, class S, class Narrow>
+[[nodiscard]] Wide widened(const Narrow& x) {
+  Wide wide{};
+  if constexpr (!std::is_same_v<Narrow, Nothing>) {
+    constexpr std::size_t n = std::min(sizeof(Narrow) / sizeof(S), sizeof(Wide) / sizeof(Quad));
+    std::array<S, n> from;
+    std::array<Quad, n> to;
+    std::memcpy(from.data(), &x, sizeof from);
+    for (std::size_t i = 0; i < n; ++i) to[i] = Quad(from[i]);
+    std::memcpy(static_cast<void*>(&wide), to.data(), sizeof to);
+  }
+  return wide;
+}
+
+struct Measured {
+  double error;     ///< largest relative error against the same operation in __float128
+  double disagree;  ///< largest relative difference of that from the generated kernel
+};
+
+template <class S>
+struct Generated;
+
+/// Worst of 1000 random inputs.
+template <template <class> class C, class S, class Op, template <class> class Reference = Generated>
+[[nodiscard]] Measured measure() {
+  using A = typename Op::A;
+  using B = typename Op::B;
+  Source source;
+  Measured worst{0.0, 0.0};
+  for (int i = 0; i < 1000; ++i) {
+    const auto exact_a = source.make(A{});
+    const auto exact_b = source.make(B{});
+    const auto a = make<C<S>>(A{}, exact_a);
+    const auto b = make<C<S>>(B{}, exact_b);
+    const auto wide_a = widened<Held<C<Quad>, A>, S>(a);
+    const auto wide_b = widened<Held<C<Quad>, B>, S>(b);
+    const auto result = Op::template run<C<S>>(a, b);
+    const auto wide = Op::template run<C<Quad>>(wide_a, wide_b);
+    using Wide = std::remove_cv_t<decltype(wide)>;
+    const Values truth = values(C<Quad>::exact(typename Op::Result{}, wide));
+    const Values found = values(C<Quad>::exact(typename Op::Result{}, widened<Wide, S>(result)));
+    const Values generated = values(Reference<Quad>::exact(
+        typename Op::Result{},
+        Op::template run<Reference<Quad>>(make<Reference<Quad>>(A{}, exact_a),
+                                          make<Reference<Quad>>(B{}, exact_b))));
+    const double error = relative_difference(found, truth);
+    const double disagree = relative_difference(truth, generated);
+    if (!(error <= worst.error)) worst.error = error;
+    if (!(disagree <= worst.disagree)) worst.disagree = disagree;
+  }
+  return worst;
+}
+
+/// The first number that a thing holds.
+template <class S, class T>
+[[nodiscard]] S& first(T& x) {
+  return *reinterpret_cast<S*>(&x);
+}
+
+template <class T, class Kind, template <class> class C, class S>
+[[nodiscard]] std::vector<T> sample(Source& source, std::size_t count) {
+  std::vector<T> all;
+  all.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) all.push_back(make<C<S>>(Kind{}, source.make(Kind{})));
+  return all;
+}
+
+/// Time an operation takes when its second operand is the result of the one before; where result
+/// and operand are of different kinds, one number of it is (times 0).  The first operand is another
+/// one every time.  Chains begin anew from the same start after 256 operations.
+template <template <class> class C, class S, class Op>
+void latency(benchmark::State& state) {
+  using A = Held<C<S>, typename Op::A>;
+  using B = Held<C<S>, typename Op::B>;
+  constexpr std::size_t length = 256;
+  Source source;
+  const auto a = sample<A, typename Op::A, C, S>(source, length);
+  const auto b = sample<B, typename Op::B, C, S>(source, length);
+  S zero(0);
+  benchmark::DoNotOptimize(zero);
+  auto last = Op::template run<C<S>>(a[0], b[0]);
+  for (auto _ : state) {
+    if constexpr (std::is_same_v<decltype(last), B>) {
+      auto x = b[0];
+      first<S>(x) += zero * first<S>(last);
+      for (std::size_t i = 0; i < length; ++i) x = Op::template run<C<S>>(a[i], x);
+      last = x;
+    } else {
+      for (std::size_t i = 0; i < length; ++i) {
+        auto x = b[i];
+        first<S>(x) += zero * first<S>(last);
+        last = Op::template run<C<S>>(a[i], x);
+      }
+    }
+    benchmark::DoNotOptimize(last);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(length) * state.iterations());
+}
+
+/// Time an operation takes over arrays of operands and results.
+template <template <class> class C, class S, class Op>
+void throughput(benchmark::State& state) {
+  using A = Held<C<S>, typename Op::A>;
+  using B = Held<C<S>, typename Op::B>;
+  const auto length = static_cast<std::size_t>(state.range(0));
+  Source source;
+  auto a = sample<A, typename Op::A, C, S>(source, length);
+  auto b = sample<B, typename Op::B, C, S>(source, length);
+  std::vector<std::remove_cv_t<decltype(Op::template run<C<S>>(a[0], b[0]))>> result;
+  for (std::size_t i = 0; i < length; ++i) result.push_back(Op::template run<C<S>>(a[i], b[i]));
+  for (auto _ : state) {
+    const A* const left = a.data();
+    const B* const right = b.data();
+    auto* const out = result.data();
+    benchmark::DoNotOptimize(left);
+    benchmark::DoNotOptimize(right);
+    benchmark::DoNotOptimize(out);
+    for (std::size_t i = 0; i < length; ++i) out[i] = Op::template run<C<S>>(left[i], right[i]);
+    benchmark::ClobberMemory();
+  }
+  state.SetItemsProcessed(static_cast<std::int64_t>(length) * state.iterations());
+}
+
+/// Where measured errors go: a JSON object a line.
+using ErrorReport = void (*)(std::FILE*);
+std::vector<ErrorReport>& error_reports();
+
+template <template <class> class C, class S, class Op>
+void enter_one(const char* scalar) {
+  const std::string name = std::string(Op::name) + "|" + C<S>::name + "|" + scalar + "|";
+  benchmark::RegisterBenchmark((name + "latency").c_str(), &latency<C, S, Op>);
+  benchmark::RegisterBenchmark((name + "array").c_str(), &throughput<C, S, Op>)
+      ->Arg(256)
+      ->Arg(4096);
+  error_reports().push_back([](std::FILE* file) {
+    const Measured worst = measure<C, S, Op>();
+    std::fprintf(file,
+                 R"({"operation": "%s", "contestant": "%s", "scalar": "%s", )"
+                 R"("max_relative_error": %.4g, "disagreement": %.4g})"
+                 "\n",
+                 Op::name, C<S>::name, std::is_same_v<S, float> ? "float" : "double", worst.error,
+                 worst.disagree);
+  });
+}
+
+/// Whether a contestant can hold an operation's operands and do it.
+template <class C, class Op>
+concept Knows = requires {
+  typename Held<C, typename Op::A>;
+  typename Held<C, typename Op::B>;
+  Op::template run<C>(std::declval<const Held<C, typename Op::A>&>(),
+                      std::declval<const Held<C, typename Op::B>&>());
+};
+
+/// Enters a contestant for one operation, if it knows it.
+template <template <class> class C, class Op>
+void enter_for() {
+  if constexpr (Knows<C<double>, Op>) {
+    enter_one<C, float, Op>("float");
+    enter_one<C, double, Op>("double");
+  }
+}
+
+/// Enters a contestant for every operation it knows.
+template <template <class> class C>
+void enter() {
+  enter_for<C, operation::MotorProduct>();
+  enter_for<C, operation::MovePoint>();
+  enter_for<C, operation::MoveDirection>();
+  enter_for<C, operation::MovePlane>();
+  enter_for<C, operation::MoveLine>();
+  enter_for<C, operation::Commutator>();
+  enter_for<C, operation::Coadjoint>();
+  enter_for<C, operation::Exp>();
+  enter_for<C, operation::Log>();
+  enter_for<C, operation::ExpLog>();
+  enter_for<C, operation::Normalize>();
+  enter_for<C, operation::RungeKutta>();
+  enter_for<C, operation::Rkmk4>();
+  enter_for<C, operation::Splitting2>();
+}
+
+}  // namespace bench

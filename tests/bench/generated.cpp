@@ -1,0 +1,5 @@
+#include "generated.hpp"
+
+namespace bench {
+void enter_generated() { enter<Generated>(); }
+}  // namespace bench
