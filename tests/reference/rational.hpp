@@ -47,7 +47,8 @@ class Rational {
  private:
   __extension__ using Wide = __int128;
 
-  static constexpr Rational reduced(Wide p, Wide q) {
+  // Not inlined: kernels are, whole, and this would make them very long.
+  [[gnu::noinline]] static constexpr Rational reduced(Wide p, Wide q) {
     Wide a = p < 0 ? -p : p;
     Wide b = q < 0 ? -q : q;
     while (b != 0) {

@@ -416,7 +416,7 @@ template <class S>
 /// Cost: 5 mul, 1 add, 1 div, 1 compensated_dot_pair, 1 double_word_scaled, 1 double_word_sqrt, 1
 /// max_abs, 1 scaling, 2 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
+[[nodiscard]] constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(b.e12));
   const S w_e12 = w_scaling.in * b.e12;
   const auto squares = scalar::compensated_dot_pair(w_e12, w_e12);
@@ -436,7 +436,7 @@ template <class S>
 /// Cost: 11 mul, 0 add, 3 div, 1 atan2, 1 compensated_dot_pair, 1 double_word_sqrt, 2 max_abs, 1
 /// pi, 1 scaling, 9 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);
@@ -461,7 +461,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 11 mul, 1 add (1 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(S(1), b.e12));
   const S r_e12 = r_scaling.in * b.e12;
   const auto total = scalar::compensated_dot_pair(r_scaling.in, r_scaling.in, r_e12, r_e12);
@@ -480,7 +480,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 11 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 4 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);
@@ -498,7 +498,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 15 mul, 1 add (1 fused), 1 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;

@@ -90,7 +90,7 @@ template <class S>
 /// Cost: 8 mul, 1 add, 1 div, 1 compensated_dot_pair, 1 double_word_scaled, 1 double_word_sqrt, 1
 /// max_abs, 1 scaling, 2 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -113,7 +113,7 @@ template <class S>
 /// Cost: 14 mul, 0 add, 3 div, 1 atan2, 1 compensated_dot_pair, 1 double_word_sqrt, 2 max_abs, 1
 /// pi, 1 scaling, 9 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);
@@ -140,7 +140,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 14 mul, 1 add (1 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -162,7 +162,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 14 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 4 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);

@@ -873,7 +873,7 @@ template <class S>
 /// Cost: 22 mul, 5 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_pair, 1
 /// double_word_scaled, 1 double_word_sqrt, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
+[[nodiscard]] constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(b.e12, -b.e31, b.e23));
   const S w_e12 = w_scaling.in * b.e12;
   const S w_e13 = w_scaling.in * -b.e31;
@@ -907,7 +907,7 @@ template <class S>
 /// Cost: 37 mul, 5 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 6 compensated_dot_pair, 1
 /// double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -971,7 +971,7 @@ template <class S>
 /// Cost: 37 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(S(1), b.e12, -b.e31, b.e23));
   const S r_e12 = r_scaling.in * b.e12;
   const S r_e13 = r_scaling.in * -b.e31;
@@ -1008,7 +1008,7 @@ template <class S>
 /// Cost: 26 mul, 2 add, 2 div, 4 compensated_dot, 2 compensated_dot_pair, 1 double_word_ratio, 2
 /// max_abs, 2 scaling, 6 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -1045,7 +1045,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 37 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;
@@ -1075,7 +1075,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 12 mul, 3 add (2 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.s, r.e12, -r.e31, r.e23));
   const S r_s = r_scaling.in * r.s;
   const S r_e12 = r_scaling.in * r.e12;

@@ -139,7 +139,7 @@ template <class S>
 /// Cost: 28 mul, 5 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_pair, 1
 /// double_word_scaled, 1 double_word_sqrt, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -179,7 +179,7 @@ template <class S>
 /// Cost: 43 mul, 5 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 6 compensated_dot_pair, 1
 /// double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -246,7 +246,7 @@ template <class S>
 /// Cost: 43 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -289,7 +289,7 @@ template <class S>
 /// Cost: 32 mul, 2 add, 2 div, 4 compensated_dot, 2 compensated_dot_pair, 1 double_word_ratio, 2
 /// max_abs, 2 scaling, 6 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;

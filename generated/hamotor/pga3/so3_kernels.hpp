@@ -94,7 +94,7 @@ template <class S>
 /// Cost: 9 mul, 0 add, 1 div, 1 compensated_dot_pair, 1 double_word_scaled, 1 double_word_sqrt, 1
 /// max_abs, 1 scaling, 1 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp(const so3::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Rotor<S> exp(const so3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -117,7 +117,7 @@ template <class S>
 /// Cost: 10 mul, 0 add, 2 div, 1 atan2, 1 compensated_dot_pair, 1 double_word_sqrt, 1 max_abs, 1
 /// pi, 1 scaling, 7 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> log(const Rotor<S>& r) noexcept {
+[[nodiscard]] constexpr so3::Rate<S> log(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;
@@ -140,7 +140,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 16 mul, 3 add (2 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
+[[nodiscard]] constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -166,7 +166,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 12 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 2 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] constexpr so3::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;

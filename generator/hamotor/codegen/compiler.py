@@ -29,7 +29,8 @@ TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
 INLINED_OPERATIONS = 128
 """Kernels of at most so many additions, multiplications and divisions are always inlined: for
-them the way of a result through memory costs more than the arithmetic."""
+them the way of a result through memory costs more than the arithmetic.  Kernels that call
+functions of the runtime are longer than their count."""
 RUNTIME_HEADERS = {"bivector_exponential": "hamotor/bivector_exponential.hpp"}
 """Functions that stand in a header of their own."""
 
@@ -175,7 +176,8 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
     if kernel.pairs and kernel.pairs[1]:
         kept, possible = kernel.pairs
         sparsity = f"{kept} of {possible} pairs of components"
-    inlined = kernel.program.cost.total <= INLINED_OPERATIONS
+    cost = kernel.program.cost
+    inlined = cost.total <= INLINED_OPERATIONS and not cost.calls
     return {
         "title": kernel_title(kernel),
         "law": kernel.law,

@@ -28,6 +28,10 @@ namespace hamotor {
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S mul_add(const S& a, const S& b, const S& c) noexcept {
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#if defined(__clang__)
+  // clang does not evaluate the builtin at compile time; constants are rounded twice there.
+  if (std::is_constant_evaluated()) return a * b + c;
+#endif
   if constexpr (std::is_same_v<S, double>) {
     return __builtin_fma(a, b, c);
   } else if constexpr (std::is_same_v<S, float>) {
@@ -153,16 +157,34 @@ template <class S>
 }
 
 template <class S>
-[[nodiscard]] constexpr S abs(const S& x) noexcept {
-  return select(x < S(0), -x, x);
+[[nodiscard]] HAMOTOR_INLINE constexpr S abs(const S& x) noexcept {
+  if constexpr (std::is_same_v<S, double>) {
+    return __builtin_fabs(x);
+  } else if constexpr (std::is_same_v<S, float>) {
+    return __builtin_fabsf(x);
+  } else {
+    return select(x < S(0), -x, x);
+  }
+}
+
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S max_abs(const S& x) noexcept {
+  return abs(x);
 }
 
 /// Largest of the absolute values.
 template <class S, std::same_as<S>... Rest>
-[[nodiscard]] constexpr S max_abs(const S& x, const Rest&... rest) noexcept {
-  S largest = abs(x);
-  ((largest = select(abs(rest) > largest, abs(rest), largest)), ...);
-  return largest;
+[[nodiscard]] HAMOTOR_INLINE constexpr S max_abs(const S& x, const S& y,
+                                                 const Rest&... rest) noexcept {
+  const S a = abs(x);
+  const S b = abs(y);
+  const S larger = select(a > b, a, b);
+  if constexpr (sizeof...(Rest) == 0) {
+    return larger;
+  } else {
+    const S others = max_abs(rest...);
+    return select(larger > others, larger, others);
+  }
 }
 
 /// π, correctly rounded to S.
