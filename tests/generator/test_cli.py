@@ -132,7 +132,7 @@ def test_a_rejected_text_exits_with_4(
         ("run toy --method eular", 'unknown method "eular".*Did you mean "euler"'),
         ("run toy extra", "unrecognized arguments: extra"),
         ("generate --signature 3,0,1", "--signature is not in this version yet"),
-        ("generate pga4", 'unknown algebra "pga4".*Did you mean'),
+        ("generate pgb3", 'unknown algebra "pgb3".*Did you mean'),
         ("list scene", 'Did you mean "scenes"'),
         ("new scnee", 'Did you mean "scene"'),
         ("show dzanibekov", 'Did you mean "dzhanibekov"'),

@@ -79,8 +79,8 @@ def test_group_functions_are_found_by_the_names_of_rates_and_momenta() -> None:
         ("pga3", "ad", ["motor"], "ad is a group's function; there are ad: Rate Rate -> Rate"),
         ("pga3", "gp", ["motor", "se3::rate"], "not those of a group"),
         ("pga3", "exp", ["motor"], "name the result"),
-        ("pga3", "exp", ["plane", "->", "motor"], "takes bivectors, which e0, e1, e2, e3 are not"),
-        ("pga3", "sandwich", ["plane", "point"], "must be a unit even versor"),
+        ("pga3", "exp", ["plane", "->", "motor"], "Plane is not a bivector"),
+        ("pga3", "sandwich", ["plane", "point"], "must be a unit versor"),
     ],
 )
 def test_what_cannot_be_shown_is_named(

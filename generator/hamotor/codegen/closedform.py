@@ -203,6 +203,40 @@ def exp_kernel(
     return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, notes)
 
 
+def log_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """Principal logarithm of a general unit rotor: log R = <R>₂ f(<R>₀ + <R>₄), f = θ / sin θ."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    value = _versor(parameter, where)
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
+    square = poly.apply_bilinear(algebra.geometric, bivector, bivector)
+    rho = poly.apply_bilinear(algebra.geometric, quad, quad)
+    if any(rho.keys() - {0}) or any(grade(b) not in (0, 4) for b in square):
+        raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
+    twisted = {
+        b: p
+        for b, p in poly.apply_bilinear(algebra.geometric, quad, bivector).items()
+        if grade(b) == 2
+    }
+    arguments = tuple(
+        polynomial_expression(p) for p in (value[0], square.get(0, {}), rho.get(0, {}))
+    )
+    writer.let("f", Call("bivector_logarithm", arguments))
+    terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("f.bivector"), bivector)]
+    if twisted:
+        terms.append((Name("f.twisted"), twisted))
+    out = _combination(terms, {})
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    notes = (
+        "Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a",
+        "bivector (not every unit versor is: −T, T a null rotation, is not).",
+    )
+    return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, notes)
+
+
 def cayley_kernel(
     algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
 ) -> Kernel:
@@ -279,11 +313,57 @@ def cayley_inverse_kernel(
     return Kernel("cayley_inverse", law, program, None, namespace, None, notes)
 
 
-def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
-    """M (~M M)^(−1/2) with ~M M = N + Q, Q² = q: (u − Q/2u)/r, r² = N² − q, u² = (N + r)/2."""
+def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
+    """A⁻¹ = ~A (N − Q) / (N² − q) for A even or odd, n ≤ 5: A ~A = N + Q, Q of grade 4, Q² = q."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    value = value_of(parameter)
+    if len({g % 2 for g in operand.grades}) != 1:
+        raise UsageError(f"{where}: {operand.name} must be even or odd")
+    square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
+    parts = _square(algebra, writer, square, "q", where)
+    norm = writer.let("norm2", polynomial_expression(parts.number))
+    reversed_ = reversed_value(value)
+    if not parts.quad:
+        factor = writer.let("factor", Quotient(ONE, norm))
+        out = _combination([(factor, reversed_)], {})
+    else:
+        omega = negative(polynomial_expression(parts.omega)) if parts.omega else None
+        squared = MultiplyAdd(norm, norm, omega) if omega is not None else Product(norm, norm)
+        inverse = writer.let("inverse", Quotient(ONE, squared))
+        factor = writer.let("factor", Product(norm, inverse))
+        slip = writer.let("slip", _times(-parts.content, inverse))
+        turned = poly.apply_bilinear(algebra.geometric, reversed_, parts.quad)
+        if len(parts.quad) == 1:
+            ((blade, p),) = parts.quad.items()
+            slip = writer.let("turn", Product(slip, polynomial_expression(p)))
+            turned = poly.apply_bilinear(algebra.geometric, reversed_, {blade: {(): 1}})
+        out = _combination([(factor, reversed_), (slip, turned)], {})
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    notes = ("Not finite where a has no inverse.",)
+    return Kernel("inverse", "a⁻¹: a a⁻¹ = 1", program, None, "", None, notes)
+
+
+def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
+    """√M = (1 + M) / |1 + M| for M ~M = 1: half the motion, √M √M = M."""
+    kernel = normalize_kernel(algebra, operand, result, where, addend=1)
+    notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
+    return Kernel("sqrt", "√m: half the motion, √m √m = m", kernel.program, None, "", None, notes)
+
+
+def normalize_kernel(
+    algebra: Algebra, operand: Element, result: Element, where: str, addend: int = 0
+) -> Kernel:
+    """M (~M M)^(−1/2) with ~M M = N + Q, Q² = q: (u − Q/2u)/r, r² = N² − q, u² = (N + r)/2.
+
+    addend: a number that is added to M first.
+    """
     (parameter,) = parameters_for(operand)
     writer = Writer()
     value = _versor(parameter, where)
+    if addend:
+        shifted = poly.added({0: {(): addend}}, {0: value[0]})[0]
+        value[0] = writer.let_polynomial("shifted", shifted)
     square = poly.apply_bilinear(algebra.geometric, reversed_value(value), value)
     parts = _square(algebra, writer, square, "q", where)
     norm = writer.let("norm2", polynomial_expression(parts.number))

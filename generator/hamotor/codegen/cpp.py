@@ -21,6 +21,7 @@ from hamotor.codegen.program import (
 
 PAIRS = {
     "bivector_exponential",
+    "bivector_logarithm",
     "compensated_dot_pair",
     "double_word_sqrt",
     "double_word_ratio",

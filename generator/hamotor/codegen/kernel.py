@@ -19,14 +19,17 @@ from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Expression,
     MultiplyAdd,
+    Name,
     Parameter,
     Product,
     Program,
     number,
     polynomial_expression,
+    walk,
 )
 
 ONE: Polynomial = {(): 1}
+BladeProduct = Callable[[Blade, Blade], Multivector]
 
 
 @dataclass(frozen=True)
@@ -174,6 +177,57 @@ class Staging:
         return {(name,): content}
 
 
+def chain_kernel(
+    algebra: Algebra,
+    name: str,
+    law: str,
+    factors: tuple[
+        tuple[Callable[[Blade, Blade], Multivector], Parameter, PolynomialMultivector], ...
+    ],
+    parameters: tuple[Parameter, ...],
+    result: Element,
+) -> Kernel:
+    """A product of several factors from left to right, each partial product computed once.
+
+    factors: the first one's product is not used.  Every other: how it is multiplied onto what
+    stands left of it, its parameter and its value (perhaps reversed).
+    """
+    staging = Staging()
+    (_, _, whole), *others = factors
+    partial = whole
+    for index, (product, parameter, value) in enumerate(others):
+        whole = poly.apply_bilinear(product, whole, value)
+        partial = poly.apply_bilinear(product, partial, value)
+        if index < len(others) - 1:
+            wanted = sorted(partial)
+            bound = {
+                b: staging.bind(f"{parameter.name}{index + 1}_{algebra.blade_name(b)}", partial[b])
+                for b in wanted
+            }
+            partial = {b: p for b, p in bound.items() if p}
+    outputs = tuple((n, polynomial_expression(p)) for n, p in read_off(partial, result).items())
+    program = without_unused(Program(parameters, tuple(staging.bindings), outputs, result))
+    return proved(Kernel(name, law, program, read_off(whole, result)))
+
+
+def without_unused(program: Program) -> Program:
+    """The program without bindings that no output needs."""
+    needed = {
+        node.text.split(".")[0]
+        for _, expression in program.outputs
+        for node in walk(expression)
+        if isinstance(node, Name)
+    }
+    kept: list[tuple[str, Expression]] = []
+    for name, expression in reversed(program.bindings):
+        if name in needed:
+            kept.append((name, expression))
+            needed |= {
+                node.text.split(".")[0] for node in walk(expression) if isinstance(node, Name)
+            }
+    return Program(program.parameters, tuple(reversed(kept)), program.outputs, program.result)
+
+
 def sandwich_kernel(
     algebra: Algebra,
     name: str,
@@ -183,29 +237,50 @@ def sandwich_kernel(
     result: Element,
     namespace: str = "",
 ) -> Kernel:
-    """M X ~M for an even unit versor M, as X + 2 (M × X) ~M.
+    """V X ~V for an even unit versor V, (−1)^k V X ~V for an odd one and X of grade k.
 
-    The identity M X ~M = X + [M, X] ~M holds where M ~M = 1.  The commutator M × X is sparse (what
-    commutes with X drops out), so this costs far fewer operations than two products, and its error
-    is proportional to the displacement, not to X.  The unit condition enters the program exactly
-    as the difference X (1 − M ~M), which the proof adds to the definition.
+    Where V ~V = 1, V X ~V = X + [V, X] ~V = −X + {V, X} ~V.  The (anti)commutator is sparse (what
+    (anti)commutes with X drops out), so this costs far fewer operations than two products; for an
+    even V its error is proportional to the displacement, not to X.  The unit condition enters the
+    program exactly as the difference ±X (1 − V ~V), which the proof adds to the definition.
     """
-    m, x = parameters_for(versor, operand)
-    motor, value = value_of(m), value_of(x)
+    v, x = parameters_for(versor, operand)
+    odd = any(g % 2 for g in versor.grades)
+    overall = -1 if odd and operand.grades[0] % 2 else 1
+    kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
+    kernels = [
+        _sandwich(algebra, name, law, (v, x), result, namespace, kind, sign, overall)
+        for kind, sign in (kinds if odd else kinds[:1])
+    ]
+    return min(kernels, key=lambda kernel: kernel.program.cost.total)
+
+
+def _sandwich(
+    algebra: Algebra,
+    name: str,
+    law: str,
+    parameters: tuple[Parameter, Parameter],
+    result: Element,
+    namespace: str,
+    kind: Callable[[Blade, Blade], Multivector],
+    sign: int,
+    overall: int,
+) -> Kernel:
+    versor, value = (value_of(p) for p in parameters)
     staging = Staging()
-    commutator = poly.apply_bilinear(algebra.commutator, motor, value)
+    half = poly.apply_bilinear(kind, versor, value)
     moved: PolynomialMultivector = {}
-    for blade in sorted(commutator):
-        named = staging.bind(f"c_{algebra.blade_name(blade)}", commutator[blade])
+    for blade in sorted(half):
+        named = staging.bind(f"c_{algebra.blade_name(blade)}", half[blade])
         if named:
             moved[blade] = named
-    turned = poly.apply_bilinear(algebra.geometric, moved, reversed_value(motor))
+    turned = poly.apply_bilinear(algebra.geometric, moved, reversed_value(versor))
     change = read_off(turned, result)
     still = read_off(value, result)
     outputs: list[tuple[str, Expression]] = []
     for component in result.components:
-        rest = change[component.name]
-        kept = polynomial_expression(still[component.name])
+        rest = poly.scaled(change[component.name], overall)
+        kept = polynomial_expression(poly.scaled(still[component.name], overall * sign))
         if not rest:
             outputs.append((component.name, kept))
             continue
@@ -216,17 +291,20 @@ def sandwich_kernel(
             outputs.append((component.name, MultiplyAdd(factor, inner, kept)))
         else:
             outputs.append((component.name, Product(factor, inner)))
-    program = Program((m, x), tuple(staging.bindings), tuple(outputs), result)
+    program = without_unused(Program(parameters, tuple(staging.bindings), tuple(outputs), result))
 
     both = poly.apply_bilinear(
         algebra.geometric,
-        poly.apply_bilinear(algebra.geometric, motor, value),
-        reversed_value(motor),
+        poly.apply_bilinear(algebra.geometric, versor, value),
+        reversed_value(versor),
     )
-    norm = poly.apply_bilinear(algebra.geometric, motor, reversed_value(motor))
+    norm = poly.apply_bilinear(algebra.geometric, versor, reversed_value(versor))
     defect = poly.added({0: ONE}, norm, -1)
-    meaning = read_off(
-        poly.added(both, poly.apply_bilinear(algebra.geometric, value, defect)), result
-    )
-    notes = ("Needs M ~M = 1: computed as X + 2 (M × X) ~M.",)
+    rest_of_unit = poly.apply_bilinear(algebra.geometric, value, defect)
+    meaning = {
+        n: poly.scaled(p, overall)
+        for n, p in read_off(poly.added(both, rest_of_unit, sign), result).items()
+    }
+    form = "X + 2 (M × X) ~M" if sign > 0 else "−X + 2 ½(M X + X M) ~M"
+    notes = (f"Needs M ~M = 1: computed as {form}.",)
     return proved(Kernel(name, law, program, meaning, namespace, None, notes))

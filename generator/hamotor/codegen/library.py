@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import prod
 
 from hamotor.codegen import closedform, transcendental
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import (
     Kernel,
+    chain_kernel,
     direct_program,
     linear_kernel,
     parameters_for,
@@ -21,9 +24,11 @@ from hamotor.codegen.kernel import (
     value_of,
 )
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
+from hamotor.codegen.program import Call, Parameter
 from hamotor.codegen.spec import AlgebraSpec, Request
 from hamotor.errors import UsageError
 
+MAXIMUM_TERMS = 200_000
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
 """Builds a kernel of an operand, a result, a namespace and what begins an error message."""
 
@@ -87,8 +92,10 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
     operands = [spec.element(name, where) for name in request.operands]
     result = spec.element(request.result, where) if request.result else None
     if request.operation in LAWS:
-        left, right = operands
         product = bilinear(algebra, request.operation)
+        if len(operands) > 2:
+            return _chain(spec, request, operands, result, where)
+        left, right = operands
         if result is None:
             a, b = parameters_for(left, right)
             result = smallest_element(
@@ -98,11 +105,68 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
         return product_kernel(algebra, name, LAWS[name], product, left, right, result)
     if request.operation == "sandwich":
         versor, operand = operands
-        if not versor.unit or any(g % 2 for g in versor.grades):
-            raise UsageError(f"{where}: {versor.name} must be a unit even versor (unit = true)")
-        law = "m x ~m: moves x by m"
+        if not versor.unit or len({g % 2 for g in versor.grades}) != 1:
+            raise UsageError(
+                f"{where}: {versor.name} must be a unit versor (unit = true), even or odd"
+            )
+        odd = any(g % 2 for g in versor.grades)
+        if odd and len(operand.grades) != 1:
+            raise UsageError(f"{where}: {operand.name} must be of one grade for an odd versor")
+        if odd and operand.fixed:
+            raise UsageError(
+                f"{where}: {operand.name} has a fixed part, whose sign a reflection may change; "
+                "name the type of any weight"
+            )
+        law = "(−1)^k m x ~m, x of grade k: reflects x in m" if odd else "m x ~m: moves x by m"
         return sandwich_kernel(algebra, "sandwich", law, versor, operand, result or operand)
+    if request.operation == "project":
+        return _project(spec, operands, result, where)
     return _unary_kernel(spec, request, operands[0], result, where)
+
+
+def _chain(
+    spec: AlgebraSpec,
+    request: Request,
+    operands: list[Element],
+    result: Element | None,
+    where: str,
+) -> Kernel:
+    """a b c …, from left to right."""
+    product = bilinear(spec.algebra, request.operation)
+    terms = prod(max(1, len(e.blades)) for e in operands)
+    if terms > MAXIMUM_TERMS:
+        raise UsageError(
+            f"{where}: {terms} products of components; {MAXIMUM_TERMS} are allowed "
+            "(MAXIMUM_TERMS in codegen/library.py lifts the cap)"
+        )
+    names = ("a", "b", "c", "d", "e", "f")
+    parameters = tuple(Parameter(n, e) for n, e in zip(names, operands, strict=False))
+    value = value_of(parameters[0])
+    for parameter in parameters[1:]:
+        value = apply_bilinear(product, value, value_of(parameter))
+    target = result or smallest_element(spec, value, where)
+    law = LAWS[request.operation] + "; of all operands from left to right"
+    factors = tuple((product, p, value_of(p)) for p in parameters)
+    return chain_kernel(spec.algebra, request.operation, law, factors, parameters, target)
+
+
+def _project(
+    spec: AlgebraSpec, operands: list[Element], result: Element | None, where: str
+) -> Kernel:
+    """(a·b) ~b for a normalised b: the projection of a onto b."""
+    algebra = spec.algebra
+    a, b = parameters_for(*operands)
+    factors = (
+        (algebra.geometric, a, value_of(a)),
+        (algebra.inner, b, value_of(b)),
+        (algebra.geometric, b, reversed_value(value_of(b))),
+    )
+    law = "(a·b) ~b: the projection of a onto b, where b ~b = 1"
+    target = result or operands[0]
+    kernel = chain_kernel(algebra, "project", law, factors, (a, b), target)
+    if not any((kernel.meaning or {}).values()):
+        raise UsageError(f"{where}: the projection is 0 for all operands")
+    return kernel
 
 
 def _unary_kernel(
@@ -140,6 +204,54 @@ def _unary_kernel(
             target = result or smallest_element(spec, dual(value_of(a)), where)
             law = "a*, the right complement: b ∧ b* = I for every basis blade b"
             return linear_kernel("complement", law, dual, operand, target)
+        case "complement_inverse":
+
+            def undual(value: PolynomialMultivector) -> PolynomialMultivector:
+                return {
+                    c: scaled(p, x)
+                    for b, p in value.items()
+                    for c, x in algebra.complement_inverse(b).items()
+                }
+
+            target = result or smallest_element(spec, undual(value_of(a)), where)
+            law = "the multivector whose right complement is a"
+            return linear_kernel("complement_inverse", law, undual, operand, target)
+        case "involute" | "conjugate" as name:
+
+            def signed(value: PolynomialMultivector) -> PolynomialMultivector:
+                turned = reversed_value(value) if name == "conjugate" else value
+                return {b: scaled(p, (-1) ** grade(b)) for b, p in turned.items()}
+
+            law = {
+                "involute": "(−1)^k on grade k, the main involution",
+                "conjugate": "the reverse of the involute (Clifford conjugation)",
+            }[name]
+            return linear_kernel(name, law, signed, operand, result or operand)
+        case "polarity" | "polarity_inverse" as name:
+            pseudoscalar = _pseudoscalar(algebra, inverse=name == "polarity_inverse", where=where)
+
+            def polar(value: PolynomialMultivector) -> PolynomialMultivector:
+                return apply_bilinear(
+                    algebra.geometric, value, {algebra.pseudoscalar: pseudoscalar}
+                )
+
+            target = result or smallest_element(spec, polar(value_of(a)), where)
+            law = "a I, the metric dual" if name == "polarity" else "a I⁻¹, the inverse metric dual"
+            return linear_kernel(name, law, polar, operand, target)
+        case "norm":
+            squared = quadratic_kernel(
+                algebra, "norm_squared", "", operand, spec.element("Scalar", where)
+            )
+            ((component, expression),) = squared.program.outputs
+            root = Call("sqrt", (Call("abs", (expression,)),))
+            program = replace(squared.program, outputs=((component, root),))
+            return Kernel("norm", "√|<a ~a>₀|", program, None)
+        case "inverse":
+            return closedform.inverse_kernel(algebra, operand, result or operand, where)
+        case "sqrt":
+            if not operand.unit:
+                raise UsageError(f"{where}: {operand.name} must be a unit versor (unit = true)")
+            return closedform.sqrt_kernel(algebra, operand, result or operand, where)
         case "norm_squared":
             target = result or spec.element("Scalar", where)
             return quadratic_kernel(algebra, "norm_squared", "<a ~a>₀", operand, target)
@@ -152,6 +264,18 @@ def _unary_kernel(
                 raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
             build_form = _closed_form(algebra, operation, operand)
             return build_form(algebra, operand, result, "", where)
+
+
+def _pseudoscalar(algebra: Algebra, *, inverse: bool, where: str) -> Polynomial:
+    """The coefficient of I, or of I⁻¹; raises UsageError where I has no inverse."""
+    if not inverse:
+        return {(): 1}
+    square = algebra.blade_product(algebra.pseudoscalar, algebra.pseudoscalar).get(0, 0)
+    if not square:
+        raise UsageError(
+            f"{where}: I² = 0 in {algebra.name}, so that a I cannot be undone; use complement"
+        )
+    return {(): ratio(1, square)}
 
 
 def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
@@ -211,11 +335,13 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
     ]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
-    operations = [("exp", rate, element), ("cayley", rate, element)]
-    plane = transcendental.split_bivectors(algebra, rate.blades)
-    if plane is not None and plane.rotation:
-        operations.insert(1, ("log", element, rate))
-    for operation, operand, result in [*operations, ("cayley_inverse", element, rate)]:
+    operations = (
+        ("exp", rate, element),
+        ("log", element, rate),
+        ("cayley", rate, element),
+        ("cayley_inverse", element, rate),
+    )
+    for operation, operand, result in operations:
         build = _closed_form(algebra, operation, operand)
         kernels.append(build(algebra, operand, result, namespace, where))
     return kernels
@@ -224,7 +350,8 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
 def _simple(algebra: Algebra, operand: Element) -> bool:
     """Whether the forms that are accurate for every input apply to the operand's bivectors."""
     bivectors = [b for b in operand.blades if grade(b) == 2]
-    return transcendental.split_bivectors(algebra, bivectors) is not None
+    plane = transcendental.split_bivectors(algebra, bivectors)
+    return plane is not None and bool(plane.rotation)
 
 
 def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedForm:
@@ -236,10 +363,11 @@ def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedFo
     }
     general: dict[str, ClosedForm] = {
         "exp": closedform.exp_kernel,
+        "log": closedform.log_kernel,
         "cayley": closedform.cayley_kernel,
         "cayley_inverse": closedform.cayley_inverse_kernel,
     }
-    forms = simple if _simple(algebra, operand) else simple | general
+    forms = simple if _simple(algebra, operand) else general
     return forms[operation]
 
 

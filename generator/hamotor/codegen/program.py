@@ -279,7 +279,10 @@ def _evaluate(
     expression: Expression, known: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
 ) -> Any:
     if isinstance(expression, Name):
-        return known[expression.text]
+        if expression.text in known:
+            return known[expression.text]
+        binding, _, field_name = expression.text.partition(".")
+        return getattr(known[binding], field_name)
     if isinstance(expression, Number):
         return functions["number"](expression.value)
     operands = [_evaluate(child, known, functions) for child in children(expression)]

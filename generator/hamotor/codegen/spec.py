@@ -31,10 +31,19 @@ OPERATIONS = {
     "commutator": 2,
     "anticommutator": 2,
     "sandwich": 2,
+    "project": 2,
     "reverse": 1,
+    "involute": 1,
+    "conjugate": 1,
     "grade": 1,
     "complement": 1,
+    "complement_inverse": 1,
+    "polarity": 1,
+    "polarity_inverse": 1,
     "norm_squared": 1,
+    "norm": 1,
+    "inverse": 1,
+    "sqrt": 1,
     "exp": 1,
     "log": 1,
     "cayley": 1,
@@ -42,6 +51,9 @@ OPERATIONS = {
     "normalize": 1,
 }
 """Operation → number of operands."""
+CHAINS = ("gp", "outer", "regressive")
+"""Associative operations, which take any number of operands from two on."""
+MAXIMUM_CHAIN = 6
 
 
 @dataclass(frozen=True)
@@ -360,10 +372,14 @@ class _Reader:
                 grade: int | None = None
                 if operation == "grade" and len(words) == 2 and words[1].isdigit():
                     grade = int(words.pop())
-                if len(words) != OPERATIONS[operation] or (arrow and len(right.split()) != 1):
+                wanted = OPERATIONS[operation]
+                fits = len(words) == wanted or (
+                    operation in CHAINS and wanted <= len(words) <= MAXIMUM_CHAIN
+                )
+                if not fits or (arrow and len(right.split()) != 1):
                     raise self.fail(
                         where,
-                        f'"{text}" must be {OPERATIONS[operation]} element name(s)'
+                        f'"{text}" must be {wanted} element name(s)'
                         + (" and a grade" if operation == "grade" else "")
                         + ', then perhaps "-> RESULT"',
                     )

@@ -15,6 +15,7 @@ RUNTIME = Path(__file__).resolve().parents[3] / "runtime" / "include"
 RUNTIME_HEADERS = (
     "hamotor/scalar.hpp",
     "hamotor/bivector_exponential.hpp",
+    "hamotor/bivector_logarithm.hpp",
     "hamotor/generic.hpp",
 )
 
@@ -61,6 +62,7 @@ def _kernel(kernel: Kernel) -> dict[str, Any]:
         "name": kernel.name,
         "product": "geometric" if kernel.name == "gp" else kernel.name,
         "title": kernel_title(kernel),
+        "odd": any(g % 2 for g in left.grades),
         "left": left.name,
         "right": right.name,
         "left_variable": _variable(left),

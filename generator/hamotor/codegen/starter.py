@@ -20,11 +20,21 @@ PRODUCTS = (
     "commutator",
     "anticommutator",
     "sandwich",
+    "project",
     "reverse",
+    "involute",
+    "conjugate",
     "grade",
     "complement",
+    "complement_inverse",
+    "polarity",
+    "polarity_inverse",
     "norm_squared",
+    "norm",
+    "inverse",
+    "sqrt",
     "exp",
+    "log",
     "cayley",
     "cayley_inverse",
     "normalize",
@@ -80,7 +90,7 @@ def starter_spec(
         "",
         "# Kernels: LEFT RIGHT -> RESULT; without a result, the smallest element that holds it.",
         "[kernels]",
-        *_kernels(basis, wanted),
+        *_kernels(basis, wanted, invertible=r == 0),
     ]
     if len(basis) >= 2:
         lines += ["", *_group(basis)]
@@ -160,7 +170,7 @@ def _elements(basis: Sequence[str]) -> list[str]:
     return lines
 
 
-def _kernels(basis: Sequence[str], wanted: Sequence[str]) -> list[str]:
+def _kernels(basis: Sequence[str], wanted: Sequence[str], *, invertible: bool) -> list[str]:
     n = len(basis)
     name = [_grade_name(g, n) for g in range(n + 1)]
     inner_grades = range(1, n)
@@ -198,8 +208,18 @@ def _kernels(basis: Sequence[str], wanted: Sequence[str]) -> list[str]:
         "grade": [f"Even {g}" for g in range(0, n + 1, 2)]
         + [f"Odd {g}" for g in range(1, n + 1, 2)],
         "complement": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
+        "complement_inverse": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
+        "polarity": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
+        "polarity_inverse": [f"{name[g]} -> {name[n - g]}" for g in inner_grades if invertible],
+        "project": [f"{name[i]} {name[j]}" for i in inner_grades for j in inner_grades if i <= j],
+        "involute": ["Even", "Odd"],
+        "conjugate": ["Even", "Odd"],
+        "norm": [name[g] for g in inner_grades],
+        "inverse": ["Even", "Odd"] if n <= 5 else [],
+        "sqrt": ["Versor"] if 2 <= n <= 5 else [],
         "norm_squared": ["Even", *(name[g] for g in inner_grades)],
         "exp": [f"{name[2]} -> Versor"] if 2 <= n <= 5 else [],
+        "log": [f"Versor -> {name[2]}"] if 2 <= n <= 5 else [],
         "cayley": [f"{name[2]} -> Versor"] if 2 <= n <= 5 else [],
         "cayley_inverse": [f"Versor -> {name[2]}"] if 2 <= n <= 5 else [],
         "normalize": ["Versor"] if 2 <= n <= 5 else [],

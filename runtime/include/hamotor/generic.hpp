@@ -136,7 +136,8 @@ class Algebra {
     return total;
   }
 
-  /// A B for basis blades.  With A = v ∧ A′ = ½(v A′ ± A′ v), only products with vectors are needed.
+  /// A B for basis blades.  With A = v ∧ A′ = ½(v A′ ± A′ v), only products with vectors are
+  /// needed.
   [[nodiscard]] Sum geometric(unsigned a, unsigned b) const {
     if (a == 0U) return Sum{{b, 1.0}};
     const int k = std::countr_zero(a);

@@ -1,0 +1,140 @@
+// The numbers in log R for a general rotor R of an algebra with at most five dimensions.
+#pragma once
+
+#include "hamotor/scalar.hpp"
+
+namespace hamotor::scalar {
+
+/// log R = bivector <R>₂ + twisted <<R>₄ <R>₂>₂.
+template <class S>
+struct BivectorLogarithm {
+  S bivector;
+  S twisted;
+};
+
+namespace detail {
+
+/// θ / sin θ from sin² θ (negative: a boost, θ / sinh θ) and cos θ ≥ −1.
+template <class S>
+[[nodiscard]] S angle_over_sine(const S& sine_squared, const S& cosine) noexcept {
+  using std::asinh;
+  const S sine = sqrt(abs(sine_squared));
+  if (!(sine > S(0))) return S(1);
+  if (sine_squared < S(0)) return asinh(sine) / sine;
+  return atan2(sine, cosine) / sine;
+}
+
+/// θ² with the sign that θ's square has: positive for a rotation.
+template <class S>
+[[nodiscard]] S squared_angle(const S& sine_squared, const S& cosine) noexcept {
+  using std::asinh;
+  const S sine = sqrt(abs(sine_squared));
+  const S angle = sine_squared < S(0) ? S(asinh(sine)) : S(atan2(sine, cosine));
+  return sine_squared < S(0) ? -(angle * angle) : angle * angle;
+}
+
+/// θ cot θ of θ² (negative: θ coth θ).
+template <class S>
+[[nodiscard]] S angle_cotangent(const S& square) noexcept {
+  using std::tan;
+  using std::tanh;
+  const S angle = sqrt(abs(square));
+  if (!(angle > S(0))) return S(1);
+  return angle / (square < S(0) ? S(tanh(angle)) : S(tan(angle)));
+}
+
+/// sin² θ of θ² (negative: −sinh² θ).
+template <class S>
+[[nodiscard]] S squared_sine(const S& square) noexcept {
+  using std::sin;
+  using std::sinh;
+  const S angle = sqrt(abs(square));
+  const S sine = square < S(0) ? S(sinh(angle)) : S(sin(angle));
+  return square < S(0) ? -(sine * sine) : sine * sine;
+}
+
+/// (θ / sin θ)(c) = Σ a_n (1 − c)^n for c = x + y Q near 1, as a ring element over Q² = rho:
+/// a_n = a_{n−1} n / (2n + 1), the expansion of arccos(c) / √(1 − c²).
+template <class S>
+[[nodiscard]] constexpr BivectorLogarithm<S> logarithm_series(const S& x, const S& y,
+                                                              const S& rho) noexcept {
+  // u = 1 − c = x + y Q
+  constexpr int terms = std::numeric_limits<S>::digits / 3 + 4;
+  S even(1);
+  S odd(0);
+  for (int n = terms; n > 0; --n) {
+    const S ratio = S(n) / S(2 * n + 1);
+    const S next_even = mul_add(even, x, odd * y * rho);
+    const S next_odd = mul_add(even, y, odd * x);
+    even = mul_add(ratio, next_even, S(1));
+    odd = ratio * next_odd;
+  }
+  return {even, odd};
+}
+
+}  // namespace detail
+
+/// The two numbers of log R from c = <R>₀, S = <<R>₂²>₀ and ρ = <R>₄² (a number).
+///
+/// With R = cosh √Q + …, Q = (log R)², everything is a function of the ring element C = c + <R>₄,
+/// in which <R>₂² = C² − 1 and log R = <R>₂ f(C), f(cos θ) = θ / sin θ.  C has the eigenvalues c ±
+/// √ρ = cos(a ± b) for rotations by a and b.  f is interpolated between these where they are
+/// separated, between a and b (one of them imaginary for a boost) where those are, and by its power
+/// series near R = 1, where neither is.  Principal: rotations with a + b ≤ π; a sheet is not
+/// changed.
+template <class S>
+[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square,
+                                                      const S& rho) noexcept {
+  const S half(0.5);
+  const S root = sqrt(abs(rho));
+  if (c > S(0) && abs(square) + S(2) * root < S(0.25)) {
+    // 1 − c without cancellation: c² = 1 + S − ρ
+    const S less = (rho - square) / (S(1) + c);
+    return detail::logarithm_series(less, S(-1), rho);
+  }
+  if (!(rho < S(0))) {
+    const S twice = S(2) * c * root;
+    const S plus = -(square + twice);
+    const S minus = -(square - twice);
+    const S f_plus = detail::angle_over_sine(plus, c + root);
+    const S f_minus = detail::angle_over_sine(minus, c - root);
+    // separated in the eigenvalues of C
+    if (root > S(0.25) * abs(square)) {
+      return {half * (f_plus + f_minus), half * (f_plus - f_minus) / root};
+    }
+    // one plane dominates: a and b are separated, a + b and a − b are near each other
+    using std::asinh;
+    const bool boost = plus + minus < S(0);
+    const S sum = boost ? S(asinh(sqrt(abs(plus)))) : S(atan2(sqrt(abs(plus)), c + root));
+    const S difference = boost ? S(asinh(sqrt(abs(minus)))) : S(atan2(sqrt(abs(minus)), c - root));
+    const S a = half * (sum + difference);
+    const S b = half * (difference - sum);
+    const S sign = boost ? S(-1) : S(1);
+    const S cot_a = detail::angle_cotangent(sign * a * a);
+    const S cot_b = detail::angle_cotangent(sign * b * b);
+    const S gap = detail::squared_sine(sign * a * a) - detail::squared_sine(sign * b * b);
+    return {half * (f_plus + f_minus), (cot_a - cot_b) / gap};
+  }
+  // a boost by a and a rotation by b: c = cosh a cos b, √−ρ = sinh a sin b
+  using std::asinh;
+  const S spread = sqrt(mul_add(square, square, S(-4) * c * c * rho));
+  // λ = (sinh a cos b)² and (cosh a sin b)², whose difference is `square`
+  const S larger = half * (abs(square) + spread);
+  const S smaller = larger > S(0) ? -(c * c * rho) / larger : S(0);
+  const S boost_part = square < S(0) ? smaller : larger;
+  const S turn_part = square < S(0) ? larger : smaller;
+  const S sinh_a = sqrt(boost_part - rho);
+  const S a = asinh(sinh_a);
+  const S b = atan2(sqrt(turn_part), c);
+  const S cot_a = detail::angle_cotangent(-a * a);
+  const S cot_b = detail::angle_cotangent(b * b);
+  const S sin_b = sqrt(turn_part) / sqrt(S(1) + sinh_a * sinh_a);
+  const S gap = -(sinh_a * sinh_a) - sin_b * sin_b;
+  // (f₊ + f₋)/2 with a → i a
+  const S cosh_a = sqrt(S(1) + sinh_a * sinh_a);
+  const S cos_b = c / cosh_a;
+  const S mean = (-(a * sinh_a * cos_b) - b * cosh_a * sin_b) / gap;
+  return {mean, (cot_a - cot_b) / gap};
+}
+
+}  // namespace hamotor::scalar
