@@ -31,14 +31,10 @@ INLINED_OPERATIONS = 128
 """Kernels of at most so many additions, multiplications and divisions are always inlined: for
 them the way of a result through memory costs more than the arithmetic.  Kernels that call
 functions of the runtime are longer than their count."""
-<<<<<<< HEAD
-RUNTIME_HEADERS = {"bivector_exponential": "hamotor/bivector_exponential.hpp"}
-=======
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
     "bivector_logarithm": "hamotor/bivector_logarithm.hpp",
 }
->>>>>>> 72b52ab690b9d9b12fb84bfd78d90cd6f660d5f0
 """Functions that stand in a header of their own."""
 
 

@@ -165,14 +165,6 @@ template <class S>
   } else {
     return select(x < S(0), -x, x);
   }
-<<<<<<< HEAD
-}
-
-template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr S max_abs(const S& x) noexcept {
-  return abs(x);
-=======
->>>>>>> 72b52ab690b9d9b12fb84bfd78d90cd6f660d5f0
 }
 
 /// Largest of the absolute values.
