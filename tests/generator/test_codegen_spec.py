@@ -182,9 +182,9 @@ def test_a_wrong_group_is_named(old: str, new: str, message: str) -> None:
         ('gp = ["Vector Rotor"]', None),
         ('gp = ["Vector Vector"]', "no element type holds the result"),
         ('outer = ["Vector Bivector"]', None),
-        ('sandwich = ["Vector Vector"]', "Vector must be a unit even versor"),
+        ('sandwich = ["Vector Vector"]', "Vector must be a unit versor"),
         ('exp = ["Bivector"]', 'name the result, as in "exp Bivector -> Motor"'),
-        ('exp = ["Vector -> Rotor"]', "takes bivectors, which e1, e2 are not"),
+        ('exp = ["Vector -> Rotor"]', "Vector is not a bivector"),
         ('grade = ["Rotor 2 3"]', "must be 1 element name"),
     ],
 )
