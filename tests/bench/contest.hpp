@@ -85,62 +85,33 @@ template <class Element>
 [[nodiscard]] inline Values values(const Values& x) { return x; }
 
 /// What a motion does: the images of the origin and of the axes.  A motor's sign does not count.
-[[nodiscard]] inline Values values(const pga3::Motor<Quad>& m) {
-  Values all = values(sandwich(m, pga3::Origin<Quad>{}));
-  for (std::size_t k = 0; k < 3; ++k) {
-    std::array<Quad, 3> axis{Quad(0), Quad(0), Quad(0)};
-    axis[k] = Quad(1);
-    for (const Quad x : values(sandwich(m, pga3::Direction<Quad>::from(axis)))) all.push_back(x);
-  }
-  return all;
-}
-
-[[nodiscard]] inline Values values(const Body<Quad>& body) {
-  Values all = values(body.motion);
-  for (const Quad x : values(body.momentum)) all.push_back(x);
-  return all;
-}
+[[nodiscard]] Values values(const pga3::Motor<Quad>& m);
+[[nodiscard]] Values values(const Body<Quad>& body);
 
 /// Random exact things of size 1.
 class Source {
  public:
-  Quad number(double size = 1.0) {
-    return Quad(std::uniform_real_distribution<double>(-size, size)(engine_));
-  }
-  template <class Element>
-  Element element() {
-    std::array<Quad, Element::size> x{};
-    for (auto& component : x) component = number();
-    return Element::from(x);
-  }
-  kind::Motion::Exact make(kind::Motion) { return exp(make(kind::Rate{})); }
-  kind::Point::Exact make(kind::Point) { return element<pga3::Point<Quad>>(); }
-  kind::Direction::Exact make(kind::Direction) { return element<pga3::Direction<Quad>>(); }
-  kind::Plane::Exact make(kind::Plane) { return element<pga3::Plane<Quad>>(); }
-  kind::Line::Exact make(kind::Line) {
-    return regressive(make(kind::Point{}), make(kind::Direction{}));
-  }
+  [[nodiscard]] pga3::Motor<Quad> make(kind::Motion);
+  [[nodiscard]] pga3::Point<Quad> make(kind::Point);
+  [[nodiscard]] pga3::Direction<Quad> make(kind::Direction);
+  [[nodiscard]] pga3::Plane<Quad> make(kind::Plane);
+  [[nodiscard]] pga3::Bivector<Quad> make(kind::Line);
+  [[nodiscard]] pga3::Bivector<Quad> make(kind::Bivector);
   /// Angles up to half a turn, spread so that long chains of brackets neither grow nor vanish.
-  kind::Rate::Exact make(kind::Rate) {
-    auto w = element<pga3::se3::Rate<Quad>>();
-    const double angle =
-        M_PI * std::pow(std::uniform_real_distribution<double>(0.0, 1.0)(engine_), 0.8);
-    const Quad factor = Quad(angle) / sqrt(w.w23 * w.w23 + w.w31 * w.w31 + w.w12 * w.w12);
-    w.w23 *= factor;
-    w.w31 *= factor;
-    w.w12 *= factor;
-    return w;
-  }
-  kind::Bivector::Exact make(kind::Bivector) {
-    return pga3::Bivector<Quad>::from(make(kind::Rate{}).components());
-  }
-  kind::Momentum::Exact make(kind::Momentum) { return element<pga3::se3::Momentum<Quad>>(); }
-  kind::Body::Exact make(kind::Body) { return {make(kind::Motion{}), make(kind::Momentum{})}; }
-  kind::Nothing make(kind::Nothing) { return {}; }
+  [[nodiscard]] pga3::se3::Rate<Quad> make(kind::Rate);
+  [[nodiscard]] pga3::se3::Momentum<Quad> make(kind::Momentum);
+  [[nodiscard]] Body<Quad> make(kind::Body);
+  [[nodiscard]] kind::Nothing make(kind::Nothing) { return {}; }
 
  private:
+  template <class Element>
+  [[nodiscard]] Element element();
+
   std::mt19937_64 engine_{20240229};
 };
+
+template <class Kind>
+using Exact = decltype(std::declval<Source&>().make(Kind{}));
 
 namespace operation {
 struct MotorProduct {
@@ -290,16 +261,11 @@ template <class C, class S, class State>
 }
 
 /// Largest difference, relative to the largest value.
-[[nodiscard]] inline double relative_difference(const Values& a, const Values& b) {
-  Quad difference(0);
-  Quad size(0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const Quad d = abs(a[i] - b[i]);
-    if (!(d <= difference)) difference = d;
-    if (abs(b[i]) > size) size = abs(b[i]);
-  }
-  return static_cast<double>(difference / size);
-}
+[[nodiscard]] double relative_difference(const Values& a, const Values& b);
+
+/// What the generated kernel gives in __float128.
+template <class Op>
+[[nodiscard]] Values reference(const Exact<typename Op::A>& a, const Exact<typename Op::B>& b);
 
 struct Nothing {};
 
@@ -313,7 +279,7 @@ template <class C>
 }
 
 template <class C, class Kind>
-using Held = decltype(make<C>(Kind{}, std::declval<Source&>().make(Kind{})));
+using Held = decltype(make<C>(Kind{}, std::declval<const Exact<Kind>&>()));
 
 /// The same numbers in __float128.  Everything held is numbers and, at its end, padding.
 template <class Wide, class S, class Narrow>
@@ -335,11 +301,8 @@ struct Measured {
   double disagree;  ///< largest relative difference of that from the generated kernel
 };
 
-template <class S>
-struct Generated;
-
 /// Worst of 1000 random inputs.
-template <template <class> class C, class S, class Op, template <class> class Reference = Generated>
+template <template <class> class C, class S, class Op>
 [[nodiscard]] Measured measure() {
   using A = typename Op::A;
   using B = typename Op::B;
@@ -357,10 +320,7 @@ template <template <class> class C, class S, class Op, template <class> class Re
     using Wide = std::remove_cv_t<decltype(wide)>;
     const Values truth = values(C<Quad>::exact(typename Op::Result{}, wide));
     const Values found = values(C<Quad>::exact(typename Op::Result{}, widened<Wide, S>(result)));
-    const Values generated = values(Reference<Quad>::exact(
-        typename Op::Result{},
-        Op::template run<Reference<Quad>>(make<Reference<Quad>>(A{}, exact_a),
-                                          make<Reference<Quad>>(B{}, exact_b))));
+    const Values generated = reference<Op>(exact_a, exact_b);
     const double error = relative_difference(found, truth);
     const double disagree = relative_difference(truth, generated);
     if (!(error <= worst.error)) worst.error = error;

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "generated.hpp"
+#include "contest.hpp"
 
 namespace bench {
 

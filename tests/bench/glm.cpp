@@ -2,7 +2,7 @@
 #define GLM_ENABLE_EXPERIMENTAL
 #include <glm/gtx/dual_quaternion.hpp>
 
-#include "generated.hpp"
+#include "contest.hpp"
 
 namespace bench {
 

@@ -13,7 +13,8 @@ std::vector<ErrorReport>& error_reports() {
 
 void enter_generated();
 void enter_tables();
-void enter_eigen();
+void enter_eigen_quaternion();
+void enter_eigen_matrix();
 #ifdef HAMOTOR_BENCH_GLM
 void enter_glm();
 #endif
@@ -26,7 +27,8 @@ void enter_ganja();
 int main(int argc, char** argv) {
   bench::enter_generated();
   bench::enter_tables();
-  bench::enter_eigen();
+  bench::enter_eigen_quaternion();
+  bench::enter_eigen_matrix();
 #ifdef HAMOTOR_BENCH_GLM
   bench::enter_glm();
 #endif

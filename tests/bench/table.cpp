@@ -2,7 +2,7 @@
 // terms that the operands have.
 #include <utility>
 
-#include "generated.hpp"
+#include "contest.hpp"
 #include "hamotor/generic.hpp"
 
 namespace bench {
@@ -35,6 +35,12 @@ inline constexpr std::array<Blade, 8> odd{
 [[nodiscard]] constexpr const auto& blades_of(kind::Line) { return bivector; }
 [[nodiscard]] constexpr const auto& blades_of(kind::Bivector) { return bivector; }
 [[nodiscard]] constexpr const auto& blades_of(kind::Rate) { return bivector; }
+/// Blades of the product of an even multivector with one of that kind.
+[[nodiscard]] constexpr const auto& between(kind::Line) { return even; }
+template <class Kind>
+[[nodiscard]] constexpr const auto& between(Kind) {
+  return odd;
+}
 inline constexpr std::array<Blade, 6> dual_bivector{
     {{3, 1}, {5, 1}, {9, 1}, {12, 1}, {10, -1}, {6, 1}}};
 [[nodiscard]] constexpr const auto& blades_of(kind::Momentum) { return dual_bivector; }
@@ -116,14 +122,10 @@ struct Table {
     return {exact(kind::Motion{}, x.motion), exact(kind::Momentum{}, x.momentum)};
   }
 
-  [[nodiscard]] static const std::vector<Term>& geometric() {
-    static const std::vector<Term> terms = algebra().terms(Product::geometric);
-    return terms;
-  }
-  [[nodiscard]] static const std::vector<Term>& bracket() {
-    static const std::vector<Term> terms = algebra().terms(Product::commutator);
-    return terms;
-  }
+  static inline const std::vector<Term> geometric = algebra().terms(Product::geometric);
+  static inline const std::vector<Term> bracket = algebra().terms(Product::commutator);
+  static inline const std::array<S, 6> factors = rate_factors<S>();
+
   [[nodiscard]] HAMOTOR_INLINE static Multivector reversed(Multivector x) {
     for (unsigned blade = 0; blade < 16; ++blade) {
       if ((std::popcount(blade) & 2) != 0) x[blade] = -x[blade];
@@ -131,7 +133,7 @@ struct Table {
     return x;
   }
   [[nodiscard]] HAMOTOR_INLINE static Multivector gp(const Multivector& a, const Multivector& b) {
-    return hamotor::generic::multiply<4, S>(geometric(), a, b);
+    return hamotor::generic::multiply<4, S>(geometric, a, b);
   }
 
   [[nodiscard]] HAMOTOR_INLINE static Multivector compose(const Multivector& a,
@@ -145,16 +147,15 @@ struct Table {
   }
   [[nodiscard]] HAMOTOR_INLINE static Multivector commutator(const Multivector& a,
                                                              const Multivector& b) {
-    return hamotor::generic::multiply<4, S>(bracket(), a, b);
+    return hamotor::generic::multiply<4, S>(bracket, a, b);
   }
   [[nodiscard]] HAMOTOR_INLINE static Multivector coadjoint(const Multivector& w,
                                                             const Multivector& mu) {
-    Multivector twice = hamotor::generic::multiply<4, S>(bracket(), mu, w);
+    Multivector twice = hamotor::generic::multiply<4, S>(bracket, mu, w);
     for (S& x : twice) x = x + x;
     return twice;
   }
   [[nodiscard]] HAMOTOR_INLINE static DenseBody slope(const DenseBody& x) {
-    static const auto factors = rate_factors<S>();
     Multivector w{};
     for (std::size_t i = 0; i < 6; ++i) {
       const Blade& dual = dual_bivector[i];
@@ -245,35 +246,39 @@ struct Sparse {
     return {exact(kind::Motion{}, x.motion), exact(kind::Momentum{}, x.momentum)};
   }
 
+  static inline const TermList<S> motor_product{Product::geometric, even, even, even, 1.0};
+  static inline const TermList<S> kinematics{Product::geometric, even, bivector, even, 1.0};
+  static inline const TermList<S> bivector_bracket{Product::commutator, bivector, bivector,
+                                                   bivector, 1.0};
+  static inline const TermList<S> momentum_bracket{Product::commutator, dual_bivector, bivector,
+                                                   dual_bivector, 2.0};
+  static inline const std::array<S, 6> factors = rate_factors<S>();
+  /// m x, and that times ~m.
+  template <class Kind>
+  static inline const TermList<S> left{Product::geometric, even, blades_of(Kind{}), between(Kind{}),
+                                       1.0};
+  template <class Kind>
+  static inline const TermList<S> right{Product::geometric, between(Kind{}), even,
+                                        blades_of(Kind{}), 1.0};
+
   [[nodiscard]] HAMOTOR_INLINE static Motion reversed(const Motion& m) {
     return {m[0], -m[1], -m[2], -m[3], -m[4], -m[5], -m[6], m[7]};
   }
   [[nodiscard]] HAMOTOR_INLINE static Motion compose(const Motion& a, const Motion& b) {
-    static const TermList<S> terms(Product::geometric, even, even, even, 1.0);
-    return terms.template multiply<8>(a, b);
+    return motor_product.template multiply<8>(a, b);
   }
   template <class Kind, std::size_t N>
-  [[nodiscard]] HAMOTOR_INLINE static std::array<S, N> move(Kind kind, const Motion& m,
+  [[nodiscard]] HAMOTOR_INLINE static std::array<S, N> move(Kind, const Motion& m,
                                                             const std::array<S, N>& x) {
-    constexpr bool is_even = std::is_same_v<Kind, kind::Line>;
-    static const TermList<S> left(Product::geometric, even, blades_of(kind), is_even ? even : odd,
-                                  1.0);
-    static const TermList<S> right(Product::geometric, is_even ? even : odd, even, blades_of(kind),
-                                   1.0);
-    return right.template multiply<N>(left.template multiply<8>(m, x), reversed(m));
+    return right<Kind>.template multiply<N>(left<Kind>.template multiply<8>(m, x), reversed(m));
   }
   [[nodiscard]] HAMOTOR_INLINE static Six commutator(const Six& a, const Six& b) {
-    static const TermList<S> terms(Product::commutator, bivector, bivector, bivector, 1.0);
-    return terms.template multiply<6>(a, b);
+    return bivector_bracket.template multiply<6>(a, b);
   }
   [[nodiscard]] HAMOTOR_INLINE static Six coadjoint(const Six& w, const Six& mu) {
-    static const TermList<S> terms(Product::commutator, dual_bivector, bivector, dual_bivector,
-                                   2.0);
-    return terms.template multiply<6>(mu, w);
+    return momentum_bracket.template multiply<6>(mu, w);
   }
   [[nodiscard]] HAMOTOR_INLINE static SparseBody slope(const SparseBody& x) {
-    static const TermList<S> kinematics(Product::geometric, even, bivector, even, 1.0);
-    static const auto factors = rate_factors<S>();
     Six w;
     for (std::size_t i = 0; i < 6; ++i) w[i] = factors[i] * x.momentum[i];
     return {kinematics.template multiply<8>(x.motion, w), coadjoint(w, x.momentum)};
