@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
 
 from hamotor.codegen import tree
 from hamotor.codegen.algebra import Algebra, Blade, Rational, grade
@@ -31,8 +33,7 @@ def show(algebra: str, product: str, operands: Sequence[str]) -> str:
     A kernel that the spec does not list is made on the fly, and its text says so.
     Raises UsageError for an unknown algebra, product, element or combination.
     """
-    spec = read_algebra(bundled_path(algebra))
-    listed = library(spec)
+    spec, listed = _read(bundled_path(algebra))
     known = list(dict.fromkeys([*OPERATIONS, *(k.name for k in listed if k.namespace)]))
     if product not in known:
         raise UsageError(
@@ -58,8 +59,9 @@ def show(algebra: str, product: str, operands: Sequence[str]) -> str:
     if result is not None:
         found = [k for k in found if _is(result, k.program.result or spec.elements["Scalar"])]
     if found:
-        return "\n\n".join(_text(kernel, ()) for kernel in found)
-    if product not in OPERATIONS or not wanted or len(wanted) != OPERATIONS[product]:
+        return _text([(kernel, ()) for kernel in found])
+    chain = product in LAWS and len(wanted) > 2
+    if not chain and len(wanted) != OPERATIONS.get(product):
         raise UsageError(_no_such(product, named, where))
     return _made_on_the_fly(spec, product, wanted, result, power, where)
 
@@ -90,6 +92,13 @@ def table(algebra: str, product: str) -> str:
     rule = "-" * len(lines[0])
     title = f"{spec.name}: {product}, {LAWS[product]}; row a, column b"
     return "\n".join([title, "", lines[0], rule, *lines[1:]])
+
+
+@cache
+def _read(path: Path) -> tuple[AlgebraSpec, tuple[Kernel, ...]]:
+    """A bundled spec and its kernels, which take a moment for a large algebra."""
+    spec = read_algebra(path)
+    return spec, library(spec)
 
 
 def _split(operands: Sequence[str], where: str) -> tuple[list[str], int | None, str | None]:
@@ -165,24 +174,27 @@ def _made_on_the_fly(
     request = Request(product, tuple(own), target, power)
     asked = str(request).removeprefix(f"{product} ")
     note = f'Not in generated/: for that, add "{asked}" to kernels.{product} in {spec.file}.'
-    return _text(request_kernel(spec, request), (note,))
+    return _text([(request_kernel(spec, request), (note,))])
 
 
-def _text(kernel: Kernel, notes: Sequence[str]) -> str:
-    data = kernel_data(kernel)
-    sparsity = f"  Sparsity: {data['sparsity']}." if data["sparsity"] else ""
-    lines = [
-        f"/// {data['title']}",
-        f"/// {data['law']}.",
-        *(f"/// {note}" for note in [*data["notes"], *notes]),
-        f"/// Cost: {data['cost']}.{sparsity}",
-        "template <class S>",
-        f"{data['attributes']} constexpr {data['signature']} noexcept {{",
-        *data["body"],
-        "}",
-    ]
-    (file,) = tree.formatted([SourceFile("kernel.hpp", "\n".join(lines) + "\n")])
-    return file.text.rstrip("\n")
+def _text(kernels: Sequence[tuple[Kernel, Sequence[str]]]) -> str:
+    """Kernels, each with further notes, formatted."""
+    files: list[SourceFile] = []
+    for kernel, notes in kernels:
+        data = kernel_data(kernel)
+        sparsity = f"  Sparsity: {data['sparsity']}." if data["sparsity"] else ""
+        lines = [
+            f"/// {data['title']}",
+            f"/// {data['law']}.",
+            *(f"/// {note}" for note in [*data["notes"], *notes]),
+            f"/// Cost: {data['cost']}.{sparsity}",
+            "template <class S>",
+            f"{data['attributes']} constexpr {data['signature']} noexcept {{",
+            *data["body"],
+            "}",
+        ]
+        files.append(SourceFile(f"{len(files)}.hpp", "\n".join(lines) + "\n"))
+    return "\n\n".join(file.text.rstrip("\n") for file in tree.formatted(files))
 
 
 def _cell(algebra: Algebra, value: Mapping[Blade, Rational]) -> str:
