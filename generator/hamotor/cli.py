@@ -17,6 +17,7 @@ from hamotor import __version__
 from hamotor.errors import CheckFailed, HamotorError, UsageError, suggest
 
 if TYPE_CHECKING:
+    from hamotor.codegen.tree import Difference
     from hamotor.run.result import Run
 
 Command = Callable[[argparse.Namespace], int]
@@ -27,6 +28,7 @@ examples:
   ./hamotor run my.toml --end 5 --step 1e-3 --out somewhere
   ./hamotor run tumble --tolerance 1e-9 --json > tumble.json
   ./hamotor new > my.toml                   a commented scene to start from
+  ./hamotor generate --signature 2,2,1 --name foo --out foo    a new algebra, ready to link
   ./hamotor show heavy_top                  what a scene models and conserves
   ./hamotor show pga3 gp motor motor        one generated kernel with its cost
   ./hamotor compare runs/a runs/b --tolerance 1e-9
@@ -52,11 +54,6 @@ _LATER_RUN_OPTIONS = {
     "seed": "--seed",
     "threads": "--threads",
     "engine": "--engine",
-}
-_LATER_GENERATE_OPTIONS = {
-    "signature": "--signature",
-    "null_pairs": "--null-pairs",
-    "name": "--name",
 }
 
 
@@ -163,6 +160,8 @@ def _parser() -> _Parser:
     listing.add_argument("what", metavar="algebras|scenes|methods")
     new = command("new", "print a commented starter file to stdout", _new)
     new.add_argument("what", metavar="scene|algebra", nargs="?", default="scene")
+    new.add_argument("--signature", metavar="P,Q,R", type=_signature, help="of the algebra")
+    _add_starter_options(new)
     compare = command("compare", "show how far two runs are apart", _compare)
     compare.add_argument("one", metavar="RUN", help="folder of a run")
     compare.add_argument("other", metavar="RUN", help="folder of another run")
@@ -214,8 +213,55 @@ def _add_generate(parser: _Parser) -> None:
         "--check", action="store_true", help="write nothing; exit with 1 if a file is out of date"
     )
     parser.add_argument("--out", metavar="DIR", help="write there instead of generated/")
-    for option in _LATER_GENERATE_OPTIONS.values():
-        parser.add_argument(option, nargs="?", const=True, help=argparse.SUPPRESS)
+    new = parser.add_argument_group("a new algebra, as a folder of its own; these need --out")
+    new.add_argument(
+        "--spec", metavar="FILE", help="generate from this spec (see: hamotor new algebra)"
+    )
+    new.add_argument(
+        "--signature",
+        metavar="P,Q,R",
+        type=_signature,
+        help="generate from numbers of positive, negative and null basis vectors",
+    )
+    _add_starter_options(new)
+
+
+def _add_starter_options(group: argparse._ActionsContainer) -> None:
+    group.add_argument(
+        "--name", metavar="NAME", help="what the algebra is called (default: algebra)"
+    )
+    group.add_argument(
+        "--null-pairs",
+        metavar="N",
+        type=_whole_number,
+        help="replace N pairs of a positive and a negative vector by null vectors, product -1",
+    )
+    group.add_argument(
+        "--products", metavar="A,B,...", help="only these operations (default: all that apply)"
+    )
+
+
+def _signature(text: str) -> tuple[int, int, int]:
+    words = text.split(",")
+    if len(words) != 3 or not all(word.strip().isdecimal() for word in words):
+        raise argparse.ArgumentTypeError(f'must be three whole numbers P,Q,R, not "{text}"')
+    p, q, r = (int(word) for word in words)
+    return p, q, r
+
+
+def _whole_number(text: str) -> int:
+    if not text.isdecimal():
+        raise argparse.ArgumentTypeError(f'must be a whole number, not "{text}"')
+    return int(text)
+
+
+def _starter_text(parsed: argparse.Namespace) -> str:
+    from hamotor.codegen import starter_spec
+
+    products = parsed.products.split(",") if parsed.products is not None else None
+    return starter_spec(
+        parsed.name or "algebra", parsed.signature, parsed.null_pairs or 0, products
+    )
 
 
 def _refuse_later_options(parsed: argparse.Namespace, later: dict[str, str]) -> None:
@@ -304,15 +350,21 @@ def _print_run(run: Run, *, as_json: bool) -> None:
 
 
 def _generate(parsed: argparse.Namespace) -> int:
-    _refuse_later_options(parsed, _LATER_GENERATE_OPTIONS)
     from hamotor.codegen import generate
 
     folder = Path(parsed.out) if parsed.out else None
     shown = str(folder) if folder else "generated"
-    differences = generate(parsed.names, check=parsed.check, out=folder)
+    again = " ".join(["./hamotor generate", *parsed.names, *(["--out", shown] * bool(folder))])
+    if parsed.spec or parsed.signature:
+        differences = _generate_new(parsed, folder)
+        again = "the same command without --check"
+    else:
+        for option in ("name", "null_pairs", "products"):
+            if getattr(parsed, option) is not None:
+                raise UsageError(f"--{option.replace('_', '-')} goes with --signature P,Q,R.")
+        differences = generate(parsed.names, check=parsed.check, out=folder)
     if parsed.check and differences:
         listed = "\n".join(f"  {d.kind:<9} {shown}/{d.path}" for d in differences)
-        again = " ".join(["./hamotor generate", *parsed.names, *(["--out", shown] * bool(folder))])
         raise CheckFailed(f"generated files are out of date:\n{listed}\nTo write them: {again}")
     for difference in differences:
         done = "removed" if difference.kind == "orphaned" else "wrote"
@@ -320,6 +372,24 @@ def _generate(parsed: argparse.Namespace) -> int:
     if not differences:
         print(f"{shown}/ is up to date")
     return 0
+
+
+def _generate_new(parsed: argparse.Namespace, folder: Path | None) -> list[Difference]:
+    from hamotor.codegen import generate_library
+
+    if parsed.names or (parsed.spec and parsed.signature):
+        raise UsageError(
+            "generate: give names of bundled algebras, --spec FILE or --signature P,Q,R."
+        )
+    if folder is None:
+        raise UsageError("generate: a new algebra needs --out DIR, the folder to write.")
+    if parsed.signature:
+        name = parsed.name or "algebra"
+        return generate_library(_starter_text(parsed), f"{name}.toml", folder, check=parsed.check)
+    from hamotor.codegen.spec import read_text
+
+    path = Path(parsed.spec)
+    return generate_library(read_text(path), path.name, folder, check=parsed.check)
 
 
 def _show(parsed: argparse.Namespace) -> int:
@@ -394,11 +464,16 @@ def _methods() -> list[tuple[str, str]]:
 
 def _new(parsed: argparse.Namespace) -> int:
     if parsed.what == "scene":
+        if parsed.signature:
+            raise UsageError("new scene: --signature goes with new algebra.")
         from hamotor.scene import starter_scene
 
         print(starter_scene(), end="")
         return 0
     if parsed.what == "algebra":
+        if parsed.signature:
+            print(_starter_text(parsed), end="")
+            return 0
         from hamotor.codegen.spec import bundled_path
 
         # A real one: the smallest algebra that is complete, with every key it can have.

@@ -118,15 +118,19 @@ def bundled_path(name: str) -> Path:
 
 def read_algebra(path: Path) -> AlgebraSpec:
     """Read and check an algebra's spec file."""
+    return parse_algebra(read_text(path), path.name)
+
+
+def read_text(path: Path) -> str:
+    """The text of a spec file; raises UsageError where it is not a readable one."""
     try:
         if not path.is_file():
             raise UsageError(f"{path.name}: not a readable file")
         if path.stat().st_size > MAXIMUM_BYTES:
             raise UsageError(f"{path.name}: larger than {MAXIMUM_BYTES} bytes, the cap for a spec")
-        text = path.read_bytes().decode("utf-8")
+        return path.read_bytes().decode("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise UsageError(f"{path.name}: cannot be read: {error}") from error
-    return parse_algebra(text, path.name)
 
 
 def parse_algebra(text: str, file: str) -> AlgebraSpec:
