@@ -435,7 +435,9 @@ concept Knows = requires {
 template <template <class> class C, class Op>
 void enter_for() {
   if constexpr (Knows<C<double>, Op>) {
+#ifndef HAMOTOR_BENCH_DOUBLE_ONLY
     enter_one<C, float, Op>("float");
+#endif
     enter_one<C, double, Op>("double");
   }
 }

@@ -1,0 +1,7 @@
+"""Benchmarks: what `hamotor bench NAME` measures, each a function that returns its account."""
+
+from __future__ import annotations
+
+from hamotor.bench.kernels import bench_kernels
+
+__all__ = ["bench_kernels"]

@@ -1,0 +1,252 @@
+"""`hamotor bench kernels`: generated kernels against tables, Eigen and peers, with every error.
+
+The C++ of tests/bench is built with each compiler there is, as a user's release would be; each
+program times itself with Google Benchmark.  Repetitions are interleaved at random, and a time is
+the median of them: what else runs on the machine then disturbs all contestants alike.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any, Final
+
+from hamotor import __version__
+from hamotor.bench.report import draw_ratios, table
+from hamotor.errors import CheckFailed, ToolError
+from hamotor.run.build import processor_name
+
+ROOT: Final = Path(__file__).resolve().parents[3]
+COMPILERS: Final = ("g++", "clang++")
+FLAGS: Final = "-O3 -DNDEBUG"
+AGREEMENT: Final = {"float": 1e-5, "double": 1e-11}
+"""How far contestants may differ for rounded operands before they are not doing the same."""
+
+MISSING_PEERS: Final = {
+    "GLM dual quaternion": "not there: needs Debian's libglm-dev",
+    "ganja.js C++": "not there: ./hamotor test --with-peers installs it from npm",
+}
+UNOBTAINABLE_PEERS: Final = {
+    "gafro": "PyPI's pygafro is a compiled module without C++ headers",
+    "versor, GATL, GAL, garamon, Klein": "in none of Debian, PyPI and npm",
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One contestant at one operation; times in ns for one operation, one for each repetition."""
+
+    operation: str
+    contestant: str
+    compiler: str
+    scalar: str
+    mode: str
+    ns: float
+    repetitions: tuple[float, ...]
+    max_relative_error: float
+
+
+def bench_kernels(
+    out: Path | None = None, json: bool = False, quick: bool = False
+) -> dict[str, Any]:
+    """Build, run and account for the benchmark of kernels.
+
+    out: where kernels.json and kernels.png go; None: nowhere.  json: print the account on stdout
+    instead of the table.  quick: double only, chains and arrays of 256, three repetitions.
+    Returns the account.  Raises ToolError if a tool is missing or the build fails, CheckFailed if
+    contestants do not agree on what an operation gives.
+    """
+    compilers = _compilers()
+    programs = _build(compilers, quick)
+    rows: list[Row] = []
+    for compiler, program in programs.items():
+        _say(f"timing, {compiler}")
+        rows += _rows(compiler, program, quick)
+    account = {
+        "benchmark": "kernels",
+        "quick": quick,
+        "unit": "ns per operation, median of the repetitions",
+        "error": "largest relative error of 1000 random inputs against __float128",
+        "rows": [asdict(row) for row in rows],
+        "not_there": _not_there({row.contestant for row in rows}),
+        "provenance": _provenance(programs),
+    }
+    _print(account, as_json=json)
+    if out is not None:
+        _write(account, out)
+    return account
+
+
+def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
+    print(json.dumps(account, indent=1) if as_json else table(account), flush=True)
+
+
+def _write(account: Mapping[str, Any], out: Path) -> None:
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "kernels.json").write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+    draw_ratios(account, out / "kernels.png")
+    _say(f"wrote {out / 'kernels.json'} and {out / 'kernels.png'}")
+
+
+def _say(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
+
+
+def _compilers() -> list[str]:
+    found = [compiler for compiler in COMPILERS if shutil.which(compiler)]
+    if not found:
+        raise ToolError("hamotor bench: no C++ compiler: neither g++ nor clang++")
+    if missing := [tool for tool in ("cmake", "ninja") if shutil.which(tool) is None]:
+        raise ToolError(
+            f"hamotor bench: no such command: {', '.join(missing)}. "
+            "`./hamotor bench` installs what it needs, or names the line that does"
+        )
+    return found
+
+
+def _build(compilers: Sequence[str], quick: bool) -> dict[str, Path]:
+    """The benchmark program of each compiler, built side by side."""
+    _say(f"building with {' and '.join(compilers)}")
+    with ThreadPoolExecutor(len(compilers)) as pool:
+        folders = list(pool.map(lambda compiler: _build_one(compiler, quick), compilers))
+    return {
+        compiler: folder / "tests" / "bench" / "kernels"
+        for compiler, folder in zip(compilers, folders, strict=True)
+    }
+
+
+def _build_one(compiler: str, quick: bool) -> Path:
+    folder = ROOT / ".hamotor" / "build" / f"bench-{'quick-' * quick}{compiler}"
+    cache = folder / "CMakeCache.txt"
+    home = f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}\n"
+    if cache.is_file() and home not in cache.read_text(encoding="utf-8"):
+        shutil.rmtree(folder)  # the clone was moved
+    _run(
+        "cmake", "-S", str(ROOT), "-B", str(folder), "-G", "Ninja",
+        f"-DCMAKE_CXX_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=Release",
+        f"-DCMAKE_CXX_FLAGS_RELEASE={FLAGS}", "-DHAMOTOR_NATIVE=ON",
+        "-DHAMOTOR_BUILD_TESTS=OFF", "-DHAMOTOR_BUILD_BENCHMARKS=ON",
+        f"-DHAMOTOR_BENCH_DOUBLE_ONLY={'ON' if quick else 'OFF'}",
+    )  # fmt: skip
+    _run("cmake", "--build", str(folder), "--target", "kernels")
+    return folder
+
+
+def _run(*command: str) -> str:
+    done = subprocess.run(
+        command, capture_output=True, text=True, errors="replace", check=False, cwd=ROOT
+    )
+    if done.returncode != 0:
+        lines = (done.stdout + done.stderr).splitlines()
+        telling = [line for line in lines if "rror" in line] or lines
+        shown = "\n".join(f"  {line}" for line in telling[:5])
+        raise ToolError(f"hamotor bench: {command[0]} failed:\n{shown}")
+    return done.stdout
+
+
+def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
+    with tempfile.TemporaryDirectory() as folder:
+        errors = _errors(program, Path(folder) / "errors")
+        times = Path(folder) / "times.json"
+        _run(
+            str(program),
+            f"--benchmark_filter={'double.*(latency|256)' if quick else '.'}",
+            f"--benchmark_repetitions={3 if quick else 9}",
+            f"--benchmark_min_time={0.002 if quick else 0.01}",
+            "--benchmark_enable_random_interleaving=true",
+            f"--benchmark_out={times}",
+            "--benchmark_out_format=json",
+        )
+        measured = json.loads(times.read_text(encoding="utf-8"))["benchmarks"]
+    found: dict[str, list[float]] = {}
+    for row in measured:
+        if row["run_type"] == "iteration":
+            found.setdefault(row["run_name"], []).append(1e9 / row["items_per_second"])
+    rows = []
+    place = {entry: index for index, entry in enumerate(errors)}
+    in_order = sorted(found.items(), key=lambda item: place[_entry(item[0])])
+    for name, nanoseconds in in_order:
+        operation, contestant, scalar, mode = name.split("|")
+        rows.append(
+            Row(
+                operation=operation,
+                contestant=contestant,
+                compiler=compiler,
+                scalar=scalar,
+                mode=mode.replace("array/", "array of "),
+                ns=median(nanoseconds),
+                repetitions=tuple(nanoseconds),
+                max_relative_error=errors[operation, contestant, scalar],
+            )
+        )
+    return rows
+
+
+def _entry(name: str) -> tuple[str, str, str]:
+    operation, contestant, scalar, _ = name.split("|")
+    return operation, contestant, scalar
+
+
+def _errors(program: Path, file: Path) -> dict[tuple[str, str, str], float]:
+    """Largest relative error by operation, contestant and scalar, once all were seen to agree."""
+    _run(str(program), f"--errors={file}")
+    errors = {}
+    for line in file.read_text(encoding="utf-8").splitlines():
+        row = json.loads(line)
+        if not row["disagreement"] <= AGREEMENT[row["scalar"]]:
+            raise CheckFailed(
+                f"hamotor bench: {row['operation']}, {row['contestant']}, {row['scalar']}: differs "
+                f"from the generated kernel by {row['disagreement']:.2g} in __float128; it does "
+                "something else and cannot be compared"
+            )
+        errors[row["operation"], row["contestant"], row["scalar"]] = row["max_relative_error"]
+    return errors
+
+
+def _not_there(contestants: set[str]) -> dict[str, str]:
+    missing = {peer: why for peer, why in MISSING_PEERS.items() if peer not in contestants}
+    return missing | UNOBTAINABLE_PEERS
+
+
+def _provenance(programs: Mapping[str, Path]) -> dict[str, Any]:
+    program = next(iter(programs.values()))
+    return {
+        "hamotor": __version__,
+        "compilers": {compiler: _first_line(compiler, "--version") for compiler in programs},
+        "flags": f"-std=gnu++20 {FLAGS} -fno-math-errno "
+        + ("-mcpu=native" if platform.machine() in {"aarch64", "arm64"} else "-march=native"),
+        "contraction": "generated: -ffp-contract=off (it fuses by itself); all others: fast",
+        "eigen": _package_version(program, "Eigen3"),
+        "google_benchmark": _package_version(program, "benchmark"),
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+        "processor": processor_name(),
+        "processors": os.cpu_count(),
+    }
+
+
+def _first_line(*command: str) -> str:
+    return _run(*command).splitlines()[0].strip()
+
+
+def _package_version(program: Path, package: str) -> str:
+    """Version of a CMake package that the build of the program found."""
+    cache = program.parents[2] / "CMakeCache.txt"
+    for line in cache.read_text(encoding="utf-8").splitlines():
+        if line.startswith(f"{package}_DIR:"):
+            file = Path(line.partition("=")[2]) / f"{package}ConfigVersion.cmake"
+            if file.is_file():
+                found = re.search(r'PACKAGE_VERSION "([^"]+)"', file.read_text(encoding="utf-8"))
+                return found[1] if found else "unknown"
+    return "unknown"
