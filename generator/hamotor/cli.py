@@ -47,8 +47,7 @@ The folder then holds run.json (the account of the run), trajectory/ (Parquet), 
 conserved.png.  An earlier run there is replaced, anything else is left alone.
 """
 
-_COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test")
-_LATER_COMMANDS = {"bench": "benchmarks"}
+_COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test", "bench")
 _LATER_RUN_OPTIONS = {
     "ensemble": "--ensemble",
     "seed": "--seed",
@@ -91,8 +90,6 @@ def _dispatch(words: list[str]) -> int:
 
 
 def _refuse_command(word: str) -> NoReturn:
-    if word in _LATER_COMMANDS:
-        raise UsageError(f'"{word}" ({_LATER_COMMANDS[word]}) is not in this version yet.')
     raise UsageError(
         f'unknown command "{word}"; commands are {", ".join(_COMMANDS)}.{suggest(word, _COMMANDS)}'
     )
@@ -178,6 +175,11 @@ def _parser() -> _Parser:
         action="store_true",
         help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
     )
+    bench = command("bench", "measure speed and error against other libraries", _bench)
+    bench.add_argument("what", metavar="kernels", nargs="?", default="kernels")
+    bench.add_argument("--quick", action="store_true", help="double only, fewer repetitions")
+    bench.add_argument("--out", metavar="DIR", help="where to write (default: runs/bench)")
+    bench.add_argument("--json", action="store_true", help="print the account, not the table")
     return parser
 
 
@@ -503,6 +505,22 @@ def _test(parsed: argparse.Namespace) -> int:
     from hamotor.testing import run_tests
 
     return run_tests(fast=parsed.fast, with_peers=parsed.with_peers)
+
+
+def _bench(parsed: argparse.Namespace) -> int:
+    benchmarks = ("kernels",)
+    if parsed.what not in benchmarks:
+        raise UsageError(
+            f'no benchmark "{parsed.what}"; there is {", ".join(benchmarks)}.'
+            f"{suggest(parsed.what, benchmarks)}"
+        )
+    from hamotor.bench import bench_kernels
+
+    out = Path(parsed.out) if parsed.out else Path("runs") / "bench"
+    if out.exists() and not out.is_dir():
+        raise UsageError(f"{out}: is not a folder")
+    bench_kernels(out, json=parsed.json, quick=parsed.quick)
+    return 0
 
 
 def _say(text: str) -> None:

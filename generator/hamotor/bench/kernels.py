@@ -53,7 +53,7 @@ class Row:
     scalar: str
     mode: str
     ns: float
-    repetitions: tuple[float, ...]
+    repetitions: list[float]
     max_relative_error: float
 
 
@@ -186,7 +186,7 @@ def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
                 scalar=scalar,
                 mode=mode.replace("array/", "array of "),
                 ns=median(nanoseconds),
-                repetitions=tuple(nanoseconds),
+                repetitions=nanoseconds,
                 max_relative_error=errors[operation, contestant, scalar],
             )
         )
