@@ -23,7 +23,7 @@ from statistics import median
 from typing import Any, Final
 
 from hamotor import __version__
-from hamotor.bench.report import draw_ratios, table
+from hamotor.bench.report import MODES, draw_ratios, table
 from hamotor.errors import CheckFailed, ToolError
 from hamotor.run.build import processor_name
 
@@ -174,9 +174,7 @@ def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
         if row["run_type"] == "iteration":
             found.setdefault(row["run_name"], []).append(1e9 / row["items_per_second"])
     rows = []
-    place = {entry: index for index, entry in enumerate(errors)}
-    in_order = sorted(found.items(), key=lambda item: place[_entry(item[0])])
-    for name, nanoseconds in in_order:
+    for name, nanoseconds in found.items():
         operation, contestant, scalar, mode = name.split("|")
         rows.append(
             Row(
@@ -190,12 +188,11 @@ def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
                 max_relative_error=errors[operation, contestant, scalar],
             )
         )
-    return rows
-
-
-def _entry(name: str) -> tuple[str, str, str]:
-    operation, contestant, scalar, _ = name.split("|")
-    return operation, contestant, scalar
+    place = {entry: index for index, entry in enumerate(errors)}
+    return sorted(
+        rows,
+        key=lambda r: (place[r.operation, r.contestant, r.scalar], MODES.index(r.mode)),
+    )
 
 
 def _errors(program: Path, file: Path) -> dict[tuple[str, str, str], float]:
