@@ -162,8 +162,8 @@ def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
         _run(
             str(program),
             f"--benchmark_filter={'double.*(latency|256)' if quick else '.'}",
-            f"--benchmark_repetitions={3 if quick else 9}",
-            f"--benchmark_min_time={0.002 if quick else 0.01}",
+            f"--benchmark_repetitions={3 if quick else 7}",
+            f"--benchmark_min_time={0.002 if quick else 0.005}",
             "--benchmark_enable_random_interleaving=true",
             f"--benchmark_out={times}",
             "--benchmark_out_format=json",
