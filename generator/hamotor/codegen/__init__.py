@@ -66,7 +66,7 @@ def generate_library(
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: is not a folder")
     marker = out / f"{spec.name}.toml"
-    if out.is_dir() and any(out.iterdir()) and not marker.is_file():
+    if not marker.is_file() and any(not path.is_dir() for path in out.rglob("*")):
         raise UsageError(
             f"{out}: holds files that are not a library of {spec.name}; name an empty folder"
         )

@@ -1,0 +1,146 @@
+"""A library generated for a new algebra: it builds and proves itself, and spares others' files."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from hamotor.codegen import generate_library, starter_spec
+from hamotor.errors import UsageError
+
+SMALL = ("gp", "outer", "sandwich", "reverse")
+
+
+def library(
+    folder: Path,
+    signature: tuple[int, int, int] = (2, 0, 0),
+    null_pairs: int = 0,
+    products: tuple[str, ...] | None = SMALL,
+) -> None:
+    text = starter_spec("foo", signature, null_pairs, products)
+    generate_library(text, "foo.toml", folder)
+
+
+def run(*command: str | Path) -> str:
+    answer = subprocess.run(
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
+    assert answer.returncode == 0, answer.stdout + answer.stderr
+    return answer.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("signature", "null_pairs"),
+    [((2, 0, 1), 0), ((3, 1, 0), 1), ((2, 2, 1), 0), ((1, 1, 0), 0), ((0, 3, 0), 0)],
+    ids=["degenerate", "null pair", "mixed and degenerate", "mixed", "negative"],
+)
+def test_the_folder_builds_alone_and_its_test_proves_it(
+    tmp_path: Path, signature: tuple[int, int, int], null_pairs: int
+) -> None:
+    library(tmp_path / "foo", signature, null_pairs, products=None)
+    build = tmp_path / "build"
+    flags = "-DCMAKE_CXX_FLAGS=-O1 -Werror"
+    run("cmake", "-G", "Ninja", flags, "-S", tmp_path / "foo", "-B", build)
+    run("cmake", "--build", build)
+    run("ctest", "--test-dir", build, "--no-tests=error")
+    shown = run(build / "foo_test")
+    assert "comparisons, 0 failures" in shown
+    assert int(shown.split()[1]) > 100
+
+
+def test_the_same_text_changes_nothing_the_second_time(tmp_path: Path) -> None:
+    library(tmp_path)
+    text = starter_spec("foo", (2, 0, 0), 0, SMALL)
+    assert generate_library(text, "foo.toml", tmp_path, check=True) == []
+    stale = tmp_path / "include" / "hamotor" / "foo" / "kernels.hpp"
+    stale.write_text("", encoding="utf-8")
+    (found,) = generate_library(text, "foo.toml", tmp_path, check=True)
+    assert (found.kind, found.path) == ("stale", "include/hamotor/foo/kernels.hpp")
+    assert stale.read_text(encoding="utf-8") == ""
+
+
+def test_only_the_listed_products_are_written(tmp_path: Path) -> None:
+    library(tmp_path, products=("reverse",))
+    kernels = tmp_path / "include" / "hamotor" / "foo" / "kernels.hpp"
+    text = kernels.read_text(encoding="utf-8")
+    assert " reverse(" in text
+    assert " gp(" not in text
+
+
+def test_a_folder_with_anything_else_in_it_is_refused_untouched(tmp_path: Path) -> None:
+    mine = tmp_path / "thesis.tex"
+    mine.write_text("years of work", encoding="utf-8")
+    with pytest.raises(UsageError, match="holds files that are not a library of foo"):
+        library(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_another_algebras_folder_is_refused(tmp_path: Path) -> None:
+    library(tmp_path)
+    text = starter_spec("bar", (2, 0, 0), 0, SMALL)
+    with pytest.raises(UsageError, match="holds files that are not a library of bar"):
+        generate_library(text, "bar.toml", tmp_path)
+    assert not (tmp_path / "bar.toml").exists()
+
+
+def test_empty_folders_are_no_files(tmp_path: Path) -> None:
+    (tmp_path / "include" / "hamotor").mkdir(parents=True)
+    library(tmp_path)
+    assert (tmp_path / "include" / "hamotor" / "foo" / "foo.hpp").exists()
+
+
+def test_a_file_in_the_folders_place_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "foo").write_text("", encoding="utf-8")
+    with pytest.raises(UsageError, match="is not a folder"):
+        library(tmp_path / "foo")
+
+
+@pytest.mark.parametrize(
+    ("name", "signature", "null_pairs", "products", "message"),
+    [
+        ("2foo", (2, 0, 0), 0, None, "must match"),
+        ("foo", (0, 0, 0), 0, None, "not all of them 0"),
+        ("foo", (2, -1, 0), 0, None, "three numbers ≥ 0"),
+        ("foo", (2, 0, 0), 1, None, "null pair"),
+        ("foo", (2, 1, 0), 2, None, "the signature has 2 and 1"),
+        ("foo", (5, 5, 5), 0, None, "15 dimensions; .* are allowed .* lifts the cap"),
+        ("foo", (2, 0, 0), 0, ["sandwhich"], 'unknown product.*Did you mean "sandwich"'),
+    ],
+)
+def test_what_no_algebra_can_be_is_named(
+    name: str,
+    signature: tuple[int, int, int],
+    null_pairs: int,
+    products: list[str] | None,
+    message: str,
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        starter_spec(name, signature, null_pairs, products)
+
+
+@pytest.mark.slow
+def test_a_project_links_the_folder_as_it_is(tmp_path: Path) -> None:
+    library(tmp_path / "foo", (2, 0, 1))
+    (tmp_path / "main.cpp").write_text(
+        '#include "hamotor/foo/foo.hpp"\n'
+        "int main() {\n"
+        "  constexpr hamotor::foo::Vector<int> v{2, 3, 5};\n"
+        "  static_assert(gp(v, v).s == 9 + 25);\n"
+        "}\n",
+        encoding="utf-8",
+    )
+    (tmp_path / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.22)\n"
+        "project(user LANGUAGES CXX)\n"
+        "add_subdirectory(foo)\n"
+        "add_executable(user main.cpp)\n"
+        "target_link_libraries(user PRIVATE hamotor::foo)\n",
+        encoding="utf-8",
+    )
+    build = tmp_path / "build"
+    run("cmake", "-G", "Ninja", "-S", tmp_path, "-B", build)
+    run("cmake", "--build", build)
+    run(build / "user")
