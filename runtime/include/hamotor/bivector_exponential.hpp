@@ -19,16 +19,12 @@ namespace detail {
 /// cosh √x: cos √−x for negative x.
 template <class S>
 [[nodiscard]] S cosh_root(const S& x) noexcept {
-  using std::cos;
-  using std::cosh;
   return x < S(0) ? cos(sqrt(-x)) : cosh(sqrt(x));
 }
 
 /// sinh √x / √x: sin √−x / √−x for negative x, 1 at 0.
 template <class S>
 [[nodiscard]] S sinhc_root(const S& x) noexcept {
-  using std::sin;
-  using std::sinh;
   const S root = sqrt(abs(x));
   if (!(root > S(0))) return S(1);
   return (x < S(0) ? sin(root) : sinh(root)) / root;
@@ -54,7 +50,7 @@ template <class S>
   int n = 1;
   for (; n < 40; ++n) {
     factorial = factorial * S((2 * n + 1) * (2 * n + 2));
-    if (S(1) / factorial < std::numeric_limits<S>::epsilon() / S(8)) break;
+    if (S(1) / factorial < Limits<S>::epsilon() / S(8)) break;
   }
   return n;
 }

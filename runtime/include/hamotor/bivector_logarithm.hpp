@@ -17,7 +17,6 @@ namespace detail {
 /// θ / sin θ from sin² θ (negative: a boost, θ / sinh θ) and cos θ ≥ −1.
 template <class S>
 [[nodiscard]] S angle_over_sine(const S& sine_squared, const S& cosine) noexcept {
-  using std::asinh;
   const S sine = sqrt(abs(sine_squared));
   if (!(sine > S(0))) return S(1);
   if (sine_squared < S(0)) return asinh(sine) / sine;
@@ -27,7 +26,6 @@ template <class S>
 /// θ² with the sign that θ's square has: positive for a rotation.
 template <class S>
 [[nodiscard]] S squared_angle(const S& sine_squared, const S& cosine) noexcept {
-  using std::asinh;
   const S sine = sqrt(abs(sine_squared));
   const S angle = sine_squared < S(0) ? S(asinh(sine)) : S(atan2(sine, cosine));
   return sine_squared < S(0) ? -(angle * angle) : angle * angle;
@@ -36,8 +34,6 @@ template <class S>
 /// θ cot θ of θ² (negative: θ coth θ).
 template <class S>
 [[nodiscard]] S angle_cotangent(const S& square) noexcept {
-  using std::tan;
-  using std::tanh;
   const S angle = sqrt(abs(square));
   if (!(angle > S(0))) return S(1);
   return angle / (square < S(0) ? S(tanh(angle)) : S(tan(angle)));
@@ -46,8 +42,6 @@ template <class S>
 /// sin² θ of θ² (negative: −sinh² θ).
 template <class S>
 [[nodiscard]] S squared_sine(const S& square) noexcept {
-  using std::sin;
-  using std::sinh;
   const S angle = sqrt(abs(square));
   const S sine = square < S(0) ? S(sinh(angle)) : S(sin(angle));
   return square < S(0) ? -(sine * sine) : sine * sine;
@@ -59,7 +53,7 @@ template <class S>
 [[nodiscard]] constexpr BivectorLogarithm<S> logarithm_series(const S& x, const S& y,
                                                               const S& rho) noexcept {
   // u = 1 − c = x + y Q
-  constexpr int terms = std::numeric_limits<S>::digits / 3 + 4;
+  constexpr int terms = Limits<S>::digits / 3 + 4;
   S even(1);
   S odd(0);
   for (int n = terms; n > 0; --n) {
@@ -103,7 +97,6 @@ template <class S>
       return {half * (f_plus + f_minus), half * (f_plus - f_minus) / root};
     }
     // one plane dominates: a and b are separated, a + b and a − b are near each other
-    using std::asinh;
     const bool boost = plus + minus < S(0);
     const S sum = boost ? S(asinh(sqrt(abs(plus)))) : S(atan2(sqrt(abs(plus)), c + root));
     const S difference = boost ? S(asinh(sqrt(abs(minus)))) : S(atan2(sqrt(abs(minus)), c - root));
@@ -116,7 +109,6 @@ template <class S>
     return {half * (f_plus + f_minus), (cot_a - cot_b) / gap};
   }
   // a boost by a and a rotation by b: c = cosh a cos b, √−ρ = sinh a sin b
-  using std::asinh;
   const S spread = sqrt(mul_add(square, square, S(-4) * c * c * rho));
   // λ = (sinh a cos b)² and (cosh a sin b)², whose difference is `square`
   const S larger = half * (abs(square) + spread);

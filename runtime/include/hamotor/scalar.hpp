@@ -10,6 +10,11 @@
 #include <limits>
 #include <type_traits>
 
+#if defined(__SIZEOF_FLOAT128__) && __has_include(<quadmath.h>)
+#include <quadmath.h>
+#define HAMOTOR_HAS_QUADMATH 1
+#endif
+
 /// Marks a function that is always inlined where the compiler optimises.
 ///
 /// The compilers weigh size only, and leave a motor product as a call.  Its result then returns
@@ -132,29 +137,73 @@ struct Turn {
 
 namespace scalar {
 
-template <class S>
-[[nodiscard]] constexpr S sqrt(const S& x) noexcept {
-  using std::sqrt;
-  return sqrt(x);
-}
-
-template <class S>
-[[nodiscard]] constexpr S sin(const S& x) noexcept {
-  using std::sin;
-  return sin(x);
-}
-
-template <class S>
-[[nodiscard]] constexpr S cos(const S& x) noexcept {
-  using std::cos;
-  return cos(x);
-}
+// The functions that kernels call.  Another scalar type brings its own, found by argument-dependent
+// lookup; __float128 has those of libquadmath where g++ has its header (link with -lquadmath).
+#define HAMOTOR_FUNCTION(name)                          \
+  template <class S>                                    \
+  [[nodiscard]] constexpr S name(const S& x) noexcept { \
+    using std::name;                                    \
+    return name(x);                                     \
+  }
+HAMOTOR_FUNCTION(sqrt)
+HAMOTOR_FUNCTION(sin)
+HAMOTOR_FUNCTION(cos)
+HAMOTOR_FUNCTION(tan)
+HAMOTOR_FUNCTION(sinh)
+HAMOTOR_FUNCTION(cosh)
+HAMOTOR_FUNCTION(tanh)
+HAMOTOR_FUNCTION(asinh)
+#undef HAMOTOR_FUNCTION
 
 template <class S>
 [[nodiscard]] constexpr S atan2(const S& y, const S& x) noexcept {
   using std::atan2;
   return atan2(y, x);
 }
+
+/// a b + c, rounded once.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S fma(const S& a, const S& b, const S& c) noexcept {
+  using std::fma;
+  return fma(a, b, c);
+}
+
+/// std::numeric_limits, and those of __float128, which not every library gives.
+template <class S>
+struct Limits : std::numeric_limits<S> {};
+
+#ifdef HAMOTOR_HAS_QUADMATH
+__extension__ using Float128 = __float128;
+
+inline Float128 sqrt(const Float128& x) noexcept { return sqrtq(x); }
+inline Float128 sin(const Float128& x) noexcept { return sinq(x); }
+inline Float128 cos(const Float128& x) noexcept { return cosq(x); }
+inline Float128 tan(const Float128& x) noexcept { return tanq(x); }
+inline Float128 sinh(const Float128& x) noexcept { return sinhq(x); }
+inline Float128 cosh(const Float128& x) noexcept { return coshq(x); }
+inline Float128 tanh(const Float128& x) noexcept { return tanhq(x); }
+inline Float128 asinh(const Float128& x) noexcept { return asinhq(x); }
+inline Float128 atan2(const Float128& y, const Float128& x) noexcept { return atan2q(y, x); }
+inline Float128 fma(const Float128& a, const Float128& b, const Float128& c) noexcept {
+  return fmaq(a, b, c);
+}
+
+template <>
+struct Limits<Float128> {
+  static constexpr int digits = 113;
+  static constexpr int max_exponent = 16384;
+  static constexpr Float128 max() noexcept {
+    Float128 largest = Float128(2) - epsilon();
+    for (int i = 1; i < max_exponent; ++i) largest = largest * 2;
+    return largest;
+  }
+  static constexpr Float128 epsilon() noexcept {
+    Float128 x = 1;
+    for (int i = 1; i < digits; ++i) x = x / 2;
+    return x;
+  }
+};
+#endif
 
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S abs(const S& x) noexcept {
@@ -190,7 +239,12 @@ template <class S, std::same_as<S>... Rest>
 /// π, correctly rounded to S.
 template <class S>
 [[nodiscard]] constexpr S pi() noexcept {
-  return S(3.141592653589793238462643383279502884L);
+  // Three doubles, of which the first two are exact in 106 bits.
+  if constexpr (Limits<S>::digits > std::numeric_limits<long double>::digits) {
+    return S(0x1.921fb54442d18p+1L) + S(0x1.1a62633145c07p-53L) - S(0x1.f1976b7ed8fbcp-109L);
+  } else {
+    return S(3.141592653589793238462643383279502884L);
+  }
 }
 
 /// 2^exponent, exact.
@@ -216,9 +270,9 @@ struct Scaling {
 /// The scaling for numbers of which `largest` has the largest absolute value; denormal or not.
 template <class S>
 [[nodiscard]] constexpr Scaling<S> scaling(const S& largest) noexcept {
-  constexpr int half = std::numeric_limits<S>::max_exponent / 2;
+  constexpr int half = Limits<S>::max_exponent / 2;
   constexpr int shrink = half + 4;
-  constexpr int grow = half + 2 * std::numeric_limits<S>::digits;
+  constexpr int grow = half + 2 * Limits<S>::digits;
   constexpr S large = power_of_two<S>(half - 4);
   constexpr S small = power_of_two<S>(12 - half);
   constexpr Scaling<S> from_large{power_of_two<S>(-shrink), power_of_two<S>(shrink),
@@ -237,8 +291,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S product_error(const S& a, const S& b,
                                                        const S& product) noexcept {
-  using std::fma;
-  return fma(a, b, -product);
+  return scalar::fma(a, b, -product);
 }
 
 /// a + b as an exact double-word (Knuth's two-sum).
@@ -296,7 +349,7 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr DoubleWord<S> double_word_scaled(const DoubleWord<S>& x,
                                                          const S& power) noexcept {
-  constexpr S largest = std::numeric_limits<S>::max();
+  constexpr S largest = Limits<S>::max();
   const S hi = x.hi * power;
   return {select(hi > largest, largest, hi), x.lo * power};
 }
