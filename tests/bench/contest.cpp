@@ -24,7 +24,7 @@ template <class Element>
 Element Source::element() {
   std::array<Quad, Element::size> x{};
   for (auto& component : x) {
-    component = Quad(std::uniform_real_distribution<double>(-1.0, 1.0)(engine_));
+    component = Quad(uniform(-1.0, 1.0));
   }
   return Element::from(x);
 }
@@ -39,8 +39,7 @@ pga3::Bivector<Quad> Source::make(kind::Line) {
 }
 pga3::se3::Rate<Quad> Source::make(kind::Rate) {
   auto w = element<pga3::se3::Rate<Quad>>();
-  const double angle =
-      M_PI * std::pow(std::uniform_real_distribution<double>(0.0, 1.0)(engine_), 0.8);
+  const double angle = M_PI * std::pow(uniform(0.0, 1.0), 0.8);
   const Quad factor = Quad(angle) / sqrt(w.w23 * w.w23 + w.w31 * w.w31 + w.w12 * w.w12);
   w.w23 *= factor;
   w.w31 *= factor;

@@ -104,6 +104,15 @@ class Source {
   [[nodiscard]] pga3::se3::Momentum<Quad> make(kind::Momentum);
   [[nodiscard]] Body<Quad> make(kind::Body);
   [[nodiscard]] kind::Nothing make(kind::Nothing) { return {}; }
+  /// Kinds that know themselves how.
+  template <class Kind>
+  [[nodiscard]] auto make(Kind) -> decltype(Kind::make(std::declval<Source&>())) {
+    return Kind::make(*this);
+  }
+
+  [[nodiscard]] double uniform(double low, double high) {
+    return std::uniform_real_distribution<double>(low, high)(engine_);
+  }
 
  private:
   template <class Element>

@@ -15,6 +15,9 @@ void enter_generated();
 void enter_tables();
 void enter_eigen_quaternion();
 void enter_eigen_matrix();
+void enter_conformal_generated();
+void enter_conformal_tables();
+void enter_conformal_matrices();
 #ifdef HAMOTOR_BENCH_GLM
 void enter_glm();
 #endif
@@ -35,6 +38,9 @@ int main(int argc, char** argv) {
 #ifdef HAMOTOR_BENCH_GANJA
   bench::enter_ganja();
 #endif
+  bench::enter_conformal_generated();
+  bench::enter_conformal_tables();
+  bench::enter_conformal_matrices();
   constexpr std::string_view option = "--errors=";
   if (argc == 2 && std::string_view(argv[1]).starts_with(option)) {
     std::FILE* const file = std::fopen(argv[1] + option.size(), "w");

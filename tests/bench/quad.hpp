@@ -12,6 +12,8 @@ extern "C" {
 __extension__ __float128 sqrtq(__float128) noexcept;
 __extension__ __float128 sinq(__float128) noexcept;
 __extension__ __float128 cosq(__float128) noexcept;
+__extension__ __float128 sinhq(__float128) noexcept;
+__extension__ __float128 coshq(__float128) noexcept;
 __extension__ __float128 atan2q(__float128, __float128) noexcept;
 __extension__ __float128 fmaq(__float128, __float128, __float128) noexcept;
 __extension__ __float128 fabsq(__float128) noexcept;
@@ -50,6 +52,8 @@ struct Quad {
   friend Quad sqrt(Quad x) noexcept { return sqrtq(x.bits); }
   friend Quad sin(Quad x) noexcept { return sinq(x.bits); }
   friend Quad cos(Quad x) noexcept { return cosq(x.bits); }
+  friend Quad sinh(Quad x) noexcept { return sinhq(x.bits); }
+  friend Quad cosh(Quad x) noexcept { return coshq(x.bits); }
   friend Quad atan2(Quad y, Quad x) noexcept { return atan2q(y.bits, x.bits); }
   friend Quad fma(Quad a, Quad b, Quad c) noexcept { return fmaq(a.bits, b.bits, c.bits); }
   friend Quad abs(Quad x) noexcept { return fabsq(x.bits); }

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "contest.hpp"
-#include "hamotor/generic.hpp"
+#include "table.hpp"
 
 namespace bench {
 
@@ -11,11 +11,6 @@ namespace {
 
 using hamotor::generic::Product;
 using hamotor::generic::Term;
-
-struct Blade {
-  unsigned blade;
-  int sign;  ///< of the stored component: e31 is −e13
-};
 
 // Bit k of a blade is e_k.
 inline constexpr std::array<Blade, 8> even{
@@ -175,45 +170,6 @@ struct Table {
   }
 };
 
-/// A product of two lists of blades onto a third: the terms between them.
-template <class S>
-class TermList {
- public:
-  template <std::size_t A, std::size_t B, std::size_t C>
-  TermList(Product product, const std::array<Blade, A>& a, const std::array<Blade, B>& b,
-           const std::array<Blade, C>& c, double factor) {
-    for (const Term& t : algebra().terms(product)) {
-      for (std::size_t i = 0; i < A; ++i) {
-        for (std::size_t j = 0; j < B; ++j) {
-          for (std::size_t k = 0; k < C; ++k) {
-            if (t.a == a[i].blade && t.b == b[j].blade && t.c == c[k].blade) {
-              terms_.push_back({static_cast<std::uint16_t>(i), static_cast<std::uint16_t>(j),
-                                static_cast<std::uint16_t>(k),
-                                S(factor * t.coefficient * a[i].sign * b[j].sign * c[k].sign)});
-            }
-          }
-        }
-      }
-    }
-  }
-  template <std::size_t C, std::size_t A, std::size_t B>
-  [[nodiscard]] std::array<S, C> multiply(const std::array<S, A>& a,
-                                          const std::array<S, B>& b) const {
-    std::array<S, C> c{};
-    for (const Entry& t : terms_) c[t.c] += t.coefficient * a[t.a] * b[t.b];
-    return c;
-  }
-
- private:
-  struct Entry {
-    std::uint16_t a;
-    std::uint16_t b;
-    std::uint16_t c;
-    S coefficient;
-  };
-  std::vector<Entry> terms_;
-};
-
 template <class S>
 struct Sparse {
   static constexpr const char* name = "sparse terms";
@@ -246,19 +202,21 @@ struct Sparse {
     return {exact(kind::Motion{}, x.motion), exact(kind::Momentum{}, x.momentum)};
   }
 
-  static inline const TermList<S> motor_product{Product::geometric, even, even, even, 1.0};
-  static inline const TermList<S> kinematics{Product::geometric, even, bivector, even, 1.0};
-  static inline const TermList<S> bivector_bracket{Product::commutator, bivector, bivector,
-                                                   bivector, 1.0};
-  static inline const TermList<S> momentum_bracket{Product::commutator, dual_bivector, bivector,
-                                                   dual_bivector, 2.0};
+  static inline const TermList<S> motor_product{algebra().terms(Product::geometric), even, even,
+                                                even, 1.0};
+  static inline const TermList<S> kinematics{algebra().terms(Product::geometric), even, bivector,
+                                             even, 1.0};
+  static inline const TermList<S> bivector_bracket{algebra().terms(Product::commutator), bivector,
+                                                   bivector, bivector, 1.0};
+  static inline const TermList<S> momentum_bracket{algebra().terms(Product::commutator),
+                                                   dual_bivector, bivector, dual_bivector, 2.0};
   static inline const std::array<S, 6> factors = rate_factors<S>();
   /// m x, and that times ~m.
   template <class Kind>
-  static inline const TermList<S> left{Product::geometric, even, blades_of(Kind{}), between(Kind{}),
-                                       1.0};
+  static inline const TermList<S> left{algebra().terms(Product::geometric), even, blades_of(Kind{}),
+                                       between(Kind{}), 1.0};
   template <class Kind>
-  static inline const TermList<S> right{Product::geometric, between(Kind{}), even,
+  static inline const TermList<S> right{algebra().terms(Product::geometric), between(Kind{}), even,
                                         blades_of(Kind{}), 1.0};
 
   [[nodiscard]] HAMOTOR_INLINE static Motion reversed(const Motion& m) {

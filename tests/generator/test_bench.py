@@ -146,6 +146,8 @@ def test_every_operation_is_measured_and_every_contestant_agrees(
     assert {operation for operation, _ in measured} == {
         "motor product", "point", "direction", "plane", "line", "commutator", "coadjoint", "exp",
         "log", "exp of log", "normalize", "RK4 step", "rkmk4 step", "splitting2 step",
+        "cga3 even product", "cga3 versor product", "cga3 vector", "cga3 bivector",
+        "cga3 bivector trivector", "cga3 exp",
     }  # fmt: skip
     assert all((operation, "generated") in measured for operation, _ in measured)
     assert all(r["ns"] > 0 and r["max_relative_error"] < 1e-13 for r in found["rows"])

@@ -16,6 +16,8 @@ _COLOURS = {
     "Eigen quaternion + translation": _ORANGE,
     "Eigen Isometry3": _VERMILLION,
     "Eigen 4x4 matrix": _PURPLE,
+    "Eigen 5x5 matrix": _VERMILLION,
+    "Eigen 4x4 complex": _PURPLE,
     "GLM dual quaternion": _GREEN,
     "ganja.js C++": _SKY,
     "sparse terms": "#bbbbbb",
@@ -94,7 +96,7 @@ def draw_ratios(account: Mapping[str, Any], file: Path) -> None:
 
     rows: Rows = [row for row in account["rows"] if row["scalar"] == "double"]
     modes = MODES[:2]
-    figure = Figure(figsize=(13.5, 9.5), layout="constrained")
+    figure = Figure(figsize=(18.0, 9.5), layout="constrained")
     figure.suptitle(
         "Time relative to the best Eigen over all compilers, double (below 1 is faster)"
     )
