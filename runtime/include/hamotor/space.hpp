@@ -63,6 +63,10 @@ struct RotorIncrement {
 };
 
 /// M M~ − 1: the scalar's part and the pseudoscalar's.
+///
+/// `unit_defect` takes sums in twice the working precision.  The rounding of |M|² is not
+/// independent of the digits that a compensated sum keeps beside M; a projection by it alone turns
+/// spatial momenta a little the same way in every step, by 1e-14 in a million.
 template <class S>
 struct UnitDefect {
   S scalar;
@@ -117,9 +121,22 @@ struct Space<pga3::SE3> {
 
   template <class S>
   [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Motor<S>& m) noexcept {
-    return {norm_squared(m) - S(1),
-            S(2) * mul_add(-m.e03, m.e12,
-                           mul_add(-m.e02, m.e31, mul_add(-m.e01, m.e23, m.e0123 * m.s)))};
+    return {
+        scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12),
+        S(2) * scalar::compensated_dot(m.e0123, m.s, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12)};
+  }
+
+  /// Of M + low, to first order in low.
+  template <class S>
+  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Motor<S>& m,
+                                                           const pga3::Motor<S>& low) noexcept {
+    const auto defect = unit_defect(m);
+    return {mul_add(S(2), dot(m.s, low.s, m.e23, low.e23, m.e31, low.e31, m.e12, low.e12),
+                    defect.scalar),
+            mul_add(S(2),
+                    dot(m.e0123, low.s, low.e0123, m.s, -m.e01, low.e23, -low.e01, m.e23, -m.e02,
+                        low.e31, -low.e02, m.e31, -m.e03, low.e12, -low.e03, m.e12),
+                    defect.pseudoscalar)};
   }
 
   /// −½ (M M~ − 1) M: what brings M back to the group, but for the square of the defect.
@@ -168,7 +185,18 @@ struct Space<pga3::SO3> {
 
   template <class S>
   [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Rotor<S>& m) noexcept {
-    return {norm_squared(m) - S(1), S(0)};
+    return {
+        scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12),
+        S(0)};
+  }
+
+  /// Of M + low, to first order in low.
+  template <class S>
+  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Rotor<S>& m,
+                                                           const pga3::Rotor<S>& low) noexcept {
+    return {mul_add(S(2), dot(m.s, low.s, m.e23, low.e23, m.e31, low.e31, m.e12, low.e12),
+                    unit_defect(m).scalar),
+            S(0)};
   }
 
   /// −½ (M M~ − 1) M.
@@ -216,7 +244,14 @@ struct Space<pga2::SE2> {
 
   template <class S>
   [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga2::Motor<S>& m) noexcept {
-    return {norm_squared(m) - S(1), S(0)};
+    return {scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e12, m.e12), S(0)};
+  }
+
+  /// Of M + low, to first order in low.
+  template <class S>
+  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga2::Motor<S>& m,
+                                                           const pga2::Motor<S>& low) noexcept {
+    return {mul_add(S(2), dot(m.s, low.s, m.e12, low.e12), unit_defect(m).scalar), S(0)};
   }
 
   /// −½ (M M~ − 1) M.

@@ -22,27 +22,7 @@ enum class Summation { plain, compensated };
 namespace detail {
 
 /// Adds `change` to `value`; `low` holds what does not fit (Neumaier 1974), so that a rounding
-/// error is made in the change only.  `correct(value)` is added to the sum as well.
-template <class T, class Correct>
-constexpr void add_compensated(T& value, T& low, const T& change, Correct&& correct) noexcept {
-  auto sum = value.components();
-  auto lost = low.components();
-  const auto add = change.components();
-  for (std::size_t k = 0; k < sum.size(); ++k) {
-    const auto pair = scalar::two_sum(sum[k], add[k] + lost[k]);
-    sum[k] = pair.hi;
-    lost[k] = pair.lo;
-  }
-  const auto correction = correct(T::from(sum)).components();
-  for (std::size_t k = 0; k < sum.size(); ++k) {
-    const auto pair = scalar::two_sum(sum[k], lost[k] + correction[k]);
-    sum[k] = pair.hi;
-    lost[k] = pair.lo;
-  }
-  value = T::from(sum);
-  low = T::from(lost);
-}
-
+/// error is made in the change only.
 template <class T>
 constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
   auto sum = value.components();
@@ -233,17 +213,19 @@ class Splitting2 {
   constexpr void move(Motors& motors, const Motors& change) noexcept {
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
-      const auto correction = [&](const auto& motor) {
-        const auto defect = Space<G>::unit_defect(motor);
-        worst = scalar::max_abs(worst, detail::size(defect));
-        return Space<G>::unit_correction(motor, defect);
-      };
+      auto& motor = motors[i];
+      UnitDefect<S> defect;
       if constexpr (compensated) {
-        detail::add_compensated(motors[i], low_.motors[i], change[i], correction);
+        auto& low = low_.motors[i];
+        detail::add_compensated(motor, low, change[i]);
+        defect = Space<G>::unit_defect(motor, low);
+        detail::add_compensated(motor, low, Space<G>::unit_correction(motor, defect));
       } else {
-        motors[i] = motors[i] + change[i];
-        motors[i] = motors[i] + correction(motors[i]);
+        motor = motor + change[i];
+        defect = Space<G>::unit_defect(motor);
+        motor = motor + Space<G>::unit_correction(motor, defect);
       }
+      worst = scalar::max_abs(worst, detail::size(defect));
     }
     detail::record(drift_, worst);
   }
