@@ -1,4 +1,4 @@
-"""An application links Hamotor with CMake in both ways, on a machine without Python."""
+"""An application links Hamotor with CMake in both ways, on a machine without Python and Eigen."""
 
 from __future__ import annotations
 
@@ -58,12 +58,13 @@ def step_a_body(tools: Path, project: str, build: Path, *options: str) -> str:
 
 def test_an_installed_and_a_bundled_hamotor_step_the_same_body(tools: Path, tmp_path: Path) -> None:
     prefix = tmp_path / "prefix"
-    configure(tools, ROOT, tmp_path / "own", "-DHAMOTOR_BUILD_TESTS=OFF")
+    no_eigen = "-DCMAKE_DISABLE_FIND_PACKAGE_Eigen3=ON"
+    configure(tools, ROOT, tmp_path / "own", "-DHAMOTOR_BUILD_TESTS=OFF", no_eigen)
     run(tools, "cmake", "--install", tmp_path / "own", "--prefix", prefix)
     installed = step_a_body(
-        tools, "find_package", tmp_path / "installed", f"-DCMAKE_PREFIX_PATH={prefix}"
+        tools, "find_package", tmp_path / "installed", f"-DCMAKE_PREFIX_PATH={prefix}", no_eigen
     )
-    bundled = step_a_body(tools, "add_subdirectory", tmp_path / "bundled")
+    bundled = step_a_body(tools, "add_subdirectory", tmp_path / "bundled", no_eigen)
     assert installed == bundled
     found = re.search(r"relative energy error (\S+)", bundled)
     assert found

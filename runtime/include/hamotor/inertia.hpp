@@ -5,7 +5,8 @@
 // map with the symmetric matrix K: (Π, P) = K (Ω, V), twice the kinetic energy (Ω, V)·K (Ω, V) (De
 // Keninck & Dorst 2011; Dorst & De Keninck 2023).
 //
-// This is set-up, not stepping: it allocates and throws, and is the only user of Eigen.
+// This is set-up, not stepping: it allocates and throws, and is the only user of
+// Eigen: what includes it links Eigen3::Eigen as well as hamotor::hamotor.
 #pragma once
 
 #include <Eigen/Dense>
