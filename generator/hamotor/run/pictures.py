@@ -29,6 +29,7 @@ _AXIS_COLOURS = (_VERMILLION, _GREEN, _BLUE)
 _BODY_COLOURS = (_BLACK, _PURPLE, _ORANGE, _SKY, _GREEN, _BLUE, _VERMILLION)
 _LINE_COLOURS = (_BLUE, _VERMILLION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK)
 _GREY = "#8a8a8a"
+_DARK_GREY = "#555555"
 
 _DPI = 150
 _TRIADS = 12
@@ -198,7 +199,17 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
     for axis, label in enumerate(("e1", "e2", "e3")):
         tip = 1.22 * np.eye(3)[axis]
         axes.plot(*np.stack([tip / 1.22, tip]).T, color=_GREY, linewidth=1.0)
-        axes.text(*(1.12 * tip), label, color=_GREY, fontsize=9, ha="center", va="center")
+        # Above the traces, whatever their depth, on a halo that keeps it readable.
+        axes.text(
+            *(1.12 * tip),
+            label,
+            color=_DARK_GREY,
+            fontsize=9,
+            ha="center",
+            va="center",
+            zorder=100,
+            path_effects=_halo(),
+        )
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_axis_off()
     axes.set_title(f"attitude of {body}\ntraces of its axes on the unit sphere", fontsize=10)
@@ -296,17 +307,16 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
         positive = error[error > 0]
         smallest, largest = min(smallest, positive.min()), max(largest, positive.max())
     axes.axhline(_EPSILON, color=_GREY, linewidth=0.9, linestyle=":")
+    # Beside the axes, where no curve can cross it.
     axes.annotate(
-        "rounding of a double",
+        "rounding\nof a double",
         (1, _EPSILON),
         xycoords=("axes fraction", "data"),
-        xytext=(-3, 3),
+        xytext=(5, 0),
         textcoords="offset points",
-        ha="right",
+        va="center",
         fontsize=8,
-        color=_GREY,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1},
-        zorder=4,
+        color=_DARK_GREY,
     )
     axes.set_yscale("log")
     bottom = max(_FLOOR, 10.0 ** np.floor(np.log10(smallest)))
@@ -348,6 +358,12 @@ def _title(figure: Figure, report: Mapping[str, Any], what: str = "") -> None:
     figure.suptitle(
         f"{report['scene']}{': ' if what else ''}{what}\n{how}", fontsize=11, fontweight="bold"
     )
+
+
+def _halo() -> list[Any]:
+    from matplotlib.patheffects import withStroke
+
+    return [withStroke(linewidth=3, foreground="white")]
 
 
 def _few_ticks() -> Any:
