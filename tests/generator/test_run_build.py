@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -163,3 +164,16 @@ def test_the_flags_keep_the_bits_of_the_kernels() -> None:
 def test_the_cache_can_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HAMOTOR_CACHE", str(tmp_path / "elsewhere"))
     assert compile_scene(SMALL, includes=()).library.is_relative_to(tmp_path / "elsewhere")
+
+
+def test_the_cache_keeps_the_scenes_used_last(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(build, "_KEPT_SCENES", 2)
+    texts = [SMALL.replace("42", str(number)) for number in range(3)]
+    first, second = (compile_scene(text, includes=(), cache=tmp_path) for text in texts[:2])
+    os.utime(second.library.parent, (1, 1))
+    os.utime(first.library.parent, (0, 0))
+    assert compile_scene(texts[0], includes=(), cache=tmp_path).cached
+    third = compile_scene(texts[2], includes=(), cache=tmp_path)
+    assert [scene.library.exists() for scene in (first, second, third)] == [True, False, True]

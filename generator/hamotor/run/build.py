@@ -3,6 +3,7 @@
 The library's place in the cache is the SHA-256 of everything that decides its bits: the source, the
 headers it may include, the compiler's identity, the flags and the processor (`-march=native`).
 An unchanged scene therefore never runs the compiler again, not even to ask for its version.
+The cache holds the last 200 scenes used.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -26,6 +28,7 @@ REPOSITORY = Path(__file__).resolve().parents[3]
 
 _HEADER_SUFFIXES = {".h", ".hh", ".hpp", ".hxx", ".inc", ".ipp"}
 _ERRORS_SHOWN = 3
+_KEPT_SCENES = 200
 
 
 @dataclass(frozen=True)
@@ -228,7 +231,10 @@ def compile_scene(
     library, kept_source = folder / "scene.so", folder / "scene.cpp"
     cached = library.is_file()
     compile_s = 0.0
-    if not cached:
+    if cached:
+        _mark_as_used(folder)
+    else:
+        _forget_old_scenes(cache)
         folder.mkdir(parents=True, exist_ok=True)
         _write_whole(kept_source, source.encode())
         on_compile()
@@ -244,6 +250,23 @@ def compile_scene(
         compile_s=compile_s,
         cached=cached,
     )
+
+
+def _mark_as_used(folder: Path) -> None:
+    # A cache that others may only read serves as well.
+    with suppress(OSError):
+        os.utime(folder)
+
+
+def _forget_old_scenes(cache: Path) -> None:
+    """Make room for one more: of the scenes in the cache keep those that were used last."""
+    ages = []
+    # Another process may be tidying up too.
+    for source in cache.glob(f"{'[0-9a-f]' * 64}/scene.cpp"):
+        with suppress(OSError):
+            ages.append((source.parent.stat().st_mtime_ns, source.parent))
+    for _, folder in sorted(ages, reverse=True)[_KEPT_SCENES - 1 :]:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _run_compiler(
