@@ -74,20 +74,17 @@ template <class S>
 
 /// Ad_star_inverse: Similarity Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
-/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 28 mul, 20 add (16 fused).
+/// Needs M ~M = 1: computed as X + 2 R × (X ~R).
+/// Cost: 20 mul, 14 add (12 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr sim2::Momentum<S> Ad_star_inverse(
     const Similarity<S>& m, const sim2::Momentum<S>& mu) noexcept {
-  const S c_e01 = dot(m.e12, mu.p1, m.e0i, mu.p2);
-  const S c_e02 = dot(m.e12, mu.p2, -m.e0i, mu.p1);
-  const S c_e12 = dot(m.e1i, mu.p1, m.e2i, mu.p2);
-  const S c_e0i = dot(m.e1i, mu.p2, -m.e2i, mu.p1);
-  return {
-      .l12 = mul_add(S(2), dot(c_e01, m.e1i, c_e02, m.e2i, -c_e12, m.e012i, -c_e0i, m.s), mu.l12),
-      .p1 = mul_add(S(2), dot(-c_e01, m.e12, c_e01, m.e012i, c_e02, m.s, -c_e02, m.e0i), mu.p1),
-      .p2 = mul_add(S(2), dot(-c_e01, m.s, c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i), mu.p2),
-      .q = mul_add(S(2), dot(c_e01, m.e2i, -c_e02, m.e1i, -c_e12, m.s, c_e0i, m.e012i), mu.q)};
+  const S y_e01 = dot(m.e12, mu.p1, -m.e012i, mu.p1, -m.s, mu.p2, m.e0i, mu.p2);
+  const S y_e02 = dot(m.s, mu.p1, -m.e0i, mu.p1, m.e12, mu.p2, -m.e012i, mu.p2);
+  return {.l12 = mul_add(S(2), dot(m.e1i, y_e01, m.e2i, y_e02), mu.l12),
+          .p1 = mul_add(S(-2), dot(m.e12, y_e01, m.e0i, y_e02), mu.p1),
+          .p2 = mul_add(S(2), dot(-m.e12, y_e02, m.e0i, y_e01), mu.p2),
+          .q = mul_add(S(2), dot(-m.e1i, y_e02, m.e2i, y_e01), mu.q)};
 }
 
 /// pairing: Momentum Rate -> Scalar

@@ -284,17 +284,16 @@ template <class S>
 
 /// sandwich: Motor Line -> Line
 /// m x ~m: moves x by m.
-/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 14 mul, 8 add (8 fused).
+/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
+/// Cost: 11 mul, 6 add (6 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Line<S> sandwich(const Motor<S>& m,
                                                         const Line<S>& l) noexcept {
-  const S c_e0 = dot(l.e1, m.e01, l.e2, m.e02);
-  const S c_e1 = l.e2 * m.e12;
-  const S c_e2 = l.e1 * m.e12;
-  return {.e0 = mul_add(S(2), dot(c_e0, m.s, c_e1, m.e01, -c_e2, m.e02), l.e0),
-          .e1 = mul_add(S(2), dot(c_e1, m.s, -c_e2, m.e12), l.e1),
-          .e2 = mul_add(S(-2), dot(c_e1, m.e12, c_e2, m.s), l.e2)};
+  const S y_e1 = dot(l.e1, m.s, l.e2, m.e12);
+  const S y_e2 = dot(-l.e1, m.e12, l.e2, m.s);
+  return {.e0 = mul_add(S(2), dot(m.e01, y_e1, m.e02, y_e2), l.e0),
+          .e1 = mul_add(S(2), m.e12 * y_e2, l.e1),
+          .e2 = mul_add(S(-2), m.e12 * y_e1, l.e2)};
 }
 
 /// reverse: Motor -> Motor

@@ -61,17 +61,16 @@ template <class S>
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
-/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 14 mul, 8 add (8 fused).
+/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
+/// Cost: 11 mul, 6 add (6 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se2::Momentum<S> Ad_star_inverse(
     const Motor<S>& m, const se2::Momentum<S>& mu) noexcept {
-  const S c_e0 = dot(m.e01, mu.p2, -m.e02, mu.p1);
-  const S c_e1 = m.e12 * mu.p1;
-  const S c_e2 = m.e12 * mu.p2;
-  return {.l12 = mul_add(S(2), dot(-c_e0, m.s, c_e1, m.e01, c_e2, m.e02), mu.l12),
-          .p1 = mul_add(S(2), dot(-c_e1, m.e12, c_e2, m.s), mu.p1),
-          .p2 = mul_add(S(-2), dot(c_e1, m.s, c_e2, m.e12), mu.p2)};
+  const S y_e1 = dot(-m.e12, mu.p1, m.s, mu.p2);
+  const S y_e2 = dot(m.s, mu.p1, m.e12, mu.p2);
+  return {.l12 = mul_add(S(2), dot(-m.e01, y_e1, m.e02, y_e2), mu.l12),
+          .p1 = mul_add(S(2), m.e12 * y_e1, mu.p1),
+          .p2 = mul_add(S(-2), m.e12 * y_e2, mu.p2)};
 }
 
 /// pairing: Momentum Rate -> Scalar

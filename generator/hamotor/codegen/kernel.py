@@ -239,20 +239,100 @@ def sandwich_kernel(
 ) -> Kernel:
     """V X ~V for an even unit versor V, (−1)^k V X ~V for an odd one and X of grade k.
 
-    Where V ~V = 1, V X ~V = X + [V, X] ~V = −X + {V, X} ~V.  The (anti)commutator is sparse (what
-    (anti)commutes with X drops out), so this costs far fewer operations than two products; for an
-    even V its error is proportional to the displacement, not to X.  The unit condition enters the
-    program exactly as the difference ±X (1 − V ~V), which the proof adds to the definition.
+    Where V ~V = 1, the change of X is a commutator with V.  It is sparse (what commutes with V
+    drops out), so this costs far fewer operations than two products; for an even V its error is
+    proportional to the displacement, not to X.  Several forms say the same; the cheapest is taken.
+    The unit condition enters each exactly, as a multiple of 1 − V ~V, which the proof adds to the
+    definition.
     """
     v, x = parameters_for(versor, operand)
     odd = any(g % 2 for g in versor.grades)
     overall = -1 if odd and operand.grades[0] % 2 else 1
     kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
-    kernels = [
-        _sandwich(algebra, name, law, (v, x), result, namespace, kind, sign, overall)
+    forms: list[SandwichForm | None] = [
+        _commutator_first(algebra, (v, x), kind, sign)
         for kind, sign in (kinds if odd else kinds[:1])
     ]
+    if not odd:
+        forms.append(_commutator_last(algebra, (v, x)))
+    kernels = [
+        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form)
+        for form in forms
+        if form is not None
+    ]
     return min(kernels, key=lambda kernel: kernel.program.cost.total)
+
+
+@dataclass(frozen=True)
+class SandwichForm:
+    """V X ~V = ±X + 2 `half` where V is a unit.
+
+    half:   over names that `staging` binds.
+    unit:   what is 1 where V is a unit: exactly, V X ~V + `sign` X (1 − unit) is computed.
+    """
+
+    note: str
+    sign: int
+    staging: Staging
+    half: PolynomialMultivector
+    unit: PolynomialMultivector
+
+
+def _bound(
+    algebra: Algebra, staging: Staging, prefix: str, value: PolynomialMultivector
+) -> PolynomialMultivector:
+    bound = {
+        blade: staging.bind(f"{prefix}_{algebra.blade_name(blade)}", p)
+        for blade, p in sorted(value.items())
+    }
+    return {blade: p for blade, p in bound.items() if p}
+
+
+def _commutator_first(
+    algebra: Algebra,
+    parameters: tuple[Parameter, Parameter],
+    kind: Callable[[Blade, Blade], Multivector],
+    sign: int,
+) -> SandwichForm:
+    """V X ~V = X + [V, X] ~V = −X + {V, X} ~V: the (anti)commutator is multiplied by ~V."""
+    versor, value = (value_of(p) for p in parameters)
+    staging = Staging()
+    moved = _bound(algebra, staging, "c", poly.apply_bilinear(kind, versor, value))
+    back = reversed_value(versor)
+    half = poly.apply_bilinear(algebra.geometric, moved, back)
+    unit = poly.apply_bilinear(algebra.geometric, versor, back)
+    form = "X + 2 (M × X) ~M" if sign > 0 else "−X + 2 ½(M X + X M) ~M"
+    return SandwichForm(form, sign, staging, half, unit)
+
+
+def _commutator_last(
+    algebra: Algebra, parameters: tuple[Parameter, Parameter]
+) -> SandwichForm | None:
+    """With V = R + D, D what contains the null vector e0 of a degenerate algebra, and Y = X ~R,
+
+        V X ~V = R X ~R + D Y + (its reverse, of the sign of X's) = X + 2 (R × Y + <D Y>),
+
+    where <…> keeps the grades whose reversal has X's sign.  Y is shared by both terms.
+    None where X's grades differ in that sign, or more than one vector is null and sees no other.
+    """
+    versor, value = (value_of(p) for p in parameters)
+    null = [i for i in range(algebra.dimension) if not any(algebra.gram[i])]
+    signs = {reverse_sign(b) for b in value}
+    if len(null) > 1 or len(signs) != 1:
+        return None
+    (sign,) = signs
+    mask = sum(1 << i for i in null)
+    turning = {b: p for b, p in versor.items() if not b & mask}
+    moving = {b: p for b, p in versor.items() if b & mask}
+    back = reversed_value(turning)
+    staging = Staging()
+    turned = _bound(algebra, staging, "y", poly.apply_bilinear(algebra.geometric, value, back))
+    half = poly.apply_bilinear(algebra.commutator, turning, turned)
+    across = poly.apply_bilinear(algebra.geometric, moving, turned)
+    half = poly.added(half, {b: p for b, p in across.items() if reverse_sign(b) == sign})
+    unit = poly.apply_bilinear(algebra.geometric, back, turning)
+    form = f"X + 2 (R × Y + <D Y>), Y = X ~R, {algebra.basis[null[0]]} in D = M − R" if null else ""
+    return SandwichForm(form if moving else "X + 2 R × (X ~R)", 1, staging, half, unit)
 
 
 def _sandwich(
@@ -262,25 +342,16 @@ def _sandwich(
     parameters: tuple[Parameter, Parameter],
     result: Element,
     namespace: str,
-    kind: Callable[[Blade, Blade], Multivector],
-    sign: int,
     overall: int,
+    form: SandwichForm,
 ) -> Kernel:
     versor, value = (value_of(p) for p in parameters)
-    staging = Staging()
-    half = poly.apply_bilinear(kind, versor, value)
-    moved: PolynomialMultivector = {}
-    for blade in sorted(half):
-        named = staging.bind(f"c_{algebra.blade_name(blade)}", half[blade])
-        if named:
-            moved[blade] = named
-    turned = poly.apply_bilinear(algebra.geometric, moved, reversed_value(versor))
-    change = read_off(turned, result)
+    change = read_off(form.half, result)
     still = read_off(value, result)
     outputs: list[tuple[str, Expression]] = []
     for component in result.components:
         rest = poly.scaled(change[component.name], overall)
-        kept = polynomial_expression(poly.scaled(still[component.name], overall * sign))
+        kept = polynomial_expression(poly.scaled(still[component.name], overall * form.sign))
         if not rest:
             outputs.append((component.name, kept))
             continue
@@ -291,20 +362,19 @@ def _sandwich(
             outputs.append((component.name, MultiplyAdd(factor, inner, kept)))
         else:
             outputs.append((component.name, Product(factor, inner)))
-    program = without_unused(Program(parameters, tuple(staging.bindings), tuple(outputs), result))
+    bindings = tuple(form.staging.bindings)
+    program = without_unused(Program(parameters, bindings, tuple(outputs), result))
 
     both = poly.apply_bilinear(
         algebra.geometric,
         poly.apply_bilinear(algebra.geometric, versor, value),
         reversed_value(versor),
     )
-    norm = poly.apply_bilinear(algebra.geometric, versor, reversed_value(versor))
-    defect = poly.added({0: ONE}, norm, -1)
+    defect = poly.added({0: ONE}, form.unit, -1)
     rest_of_unit = poly.apply_bilinear(algebra.geometric, value, defect)
     meaning = {
         n: poly.scaled(p, overall)
-        for n, p in read_off(poly.added(both, rest_of_unit, sign), result).items()
+        for n, p in read_off(poly.added(both, rest_of_unit, form.sign), result).items()
     }
-    form = "X + 2 (M × X) ~M" if sign > 0 else "−X + 2 ½(M X + X M) ~M"
-    notes = (f"Needs M ~M = 1: computed as {form}.",)
+    notes = (f"Needs M ~M = 1: computed as {form.note}.",)
     return proved(Kernel(name, law, program, meaning, namespace, None, notes))
