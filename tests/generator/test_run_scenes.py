@@ -63,6 +63,18 @@ def test_the_state_a_scene_starts_from_is_the_first_row(name: str) -> None:
     np.testing.assert_allclose(first, simulation.state, rtol=0, atol=1e-14)
 
 
+def test_the_final_state_in_a_wider_scalar_has_all_its_digits(tmp_path: Path) -> None:
+    run = hamotor.load("tumble").run(scalar="long_double", end=1, out=tmp_path, pictures=False)
+    (said,) = json.loads((tmp_path / "run.json").read_text())["final"].values()
+    motor = {blade: np.longdouble(text) for blade, text in said["motor"].items()}
+    rotor = np.array([motor[blade] for blade in ("s", "e23", "e31", "e12")])
+    assert all(isinstance(text, str) for text in said["motor"].values())
+    assert abs(rotor @ rotor - 1) < 4 * np.finfo(np.longdouble).eps
+    assert [float(x) for x in motor.values()] == list(run.motor()[-1])
+    rotation = np.array(said["rotation"], dtype=np.longdouble)
+    assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 8 * np.finfo(np.longdouble).eps
+
+
 @pytest.mark.parametrize("method", ["rkmk4", "splitting2"])
 def test_the_methods_agree_where_the_steps_are_short(method: str) -> None:
     simulation = hamotor.load("tumble")

@@ -143,6 +143,12 @@ EXPORT void hamotor_observe(const void* handle, double* row) {
   write_row(*static_cast<const Run*>(handle), row);
 }
 
+EXPORT void hamotor_observe_wide(const void* handle, long double* row) {
+  double values[columns];
+  write_row(*static_cast<const Run*>(handle), values);
+  for (int k = 0; k < columns; ++k) row[k] = values[k];
+}
+
 EXPORT void hamotor_state(const void* handle, double* state) {
   double row[columns];
   write_row(*static_cast<const Run*>(handle), row);

@@ -106,6 +106,9 @@ TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
     ASSERT_NE(run, nullptr);
     Row first{};
     hamotor_observe(run, first.data());
+    std::array<long double, std::tuple_size_v<Row>> wide{};
+    hamotor_observe_wide(run, wide.data());
+    for (std::size_t k = 0; k < wide.size(); ++k) EXPECT_EQ(first[k], wide[k]);
     std::array<Row, 4> rows{};
     EXPECT_EQ(hamotor_advance(run, 7, 5, rows[0].data()), 7);
     EXPECT_EQ(hamotor_advance(run, 10, 5, rows[1].data()), 10);

@@ -7,14 +7,17 @@ A motor's rotor part is s + e23 e2∧e3 + e31 e3∧e1 + e12 e1∧e2 with quatern
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+Float = TypeVar("Float", np.float64, np.longdouble)
+
 
 def rotation_matrices(
-    blades: Mapping[str, NDArray[np.float64]],
-) -> NDArray[np.float64]:
+    blades: Mapping[str, NDArray[Float]],
+) -> NDArray[Float]:
     """R with v_world = R v_body, shape (n, 3, 3), or (n, 2, 2) for a motor without e23.
 
     `blades`: blade → components of the motors, shape (n,) each.  The size of the rotor part does

@@ -1,7 +1,7 @@
 """The compiled scene seen from Python: its C ABI, version 1, bound with ctypes.
 
-ARCHITECTURE.md states the ABI.  All numbers cross as double; states and rows are contiguous
-float64 arrays.
+ARCHITECTURE.md states the ABI.  States and rows are contiguous float64 arrays; one row can be had
+in long double.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ ABI_VERSION = 1
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float64]
+WideVector = NDArray[np.longdouble]
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,11 @@ class Description:
     momentum: tuple[str, ...]
     columns: tuple[Column, ...]
     conserved: tuple[Conserved, ...]
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether the scalar has more digits than a double."""
+        return self.scalar == "long double"
 
     @cached_property
     def column_index(self) -> dict[str, int]:
@@ -174,6 +180,7 @@ class SceneLibrary:
             "hamotor_start": (run, [ctypes.c_char_p, number, number, numbers]),
             "hamotor_advance": (whole, [run, whole, whole, numbers]),
             "hamotor_observe": (None, [run, numbers]),
+            "hamotor_observe_wide": (None, [run, ctypes.c_void_p]),
             "hamotor_state": (None, [run, numbers]),
             "hamotor_drift": (None, [run, numbers]),
             "hamotor_stop": (None, [run]),
@@ -241,6 +248,12 @@ class LiveRun:
         """One row of the trajectory for the state now, shape (columns,)."""
         row = np.empty(len(self.description.columns))
         self._c.hamotor_observe(self._handle, _pointer(row))
+        return row
+
+    def observe_wide(self) -> WideVector:
+        """The same row with all digits that a C `long double` holds, shape (columns,)."""
+        row = np.empty(len(self.description.columns), dtype=np.longdouble)
+        self._c.hamotor_observe_wide(self._handle, row.ctypes.data)
         return row
 
     def state(self) -> Vector:

@@ -1,6 +1,7 @@
 """`run.json`, the account of a run, and the summary a person reads.
 
-Numbers of the result carry 17 significant digits, so that reading them gives the same double.
+Numbers of the result carry 17 significant digits, so that reading them gives the same double.  The
+final state in a wider scalar is strings with all its digits.
 """
 
 from __future__ import annotations
@@ -13,10 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hamotor.run.attitude import rotation_matrices
+from hamotor.run.attitude import Float, rotation_matrices
 from hamotor.run.build import CompiledScene
-from hamotor.run.library import Description, Vector
+from hamotor.run.library import Description
 from hamotor.run.runner import Outcome
 
 _EXACT = {"final", "conserved"}
@@ -65,7 +67,10 @@ def report(
         "status": outcome.status,
         "problem": outcome.problem,
         "final": {
-            body: final_state(body, description, outcome.final) for body in description.bodies
+            body: final_state(body, description, outcome.final)
+            if outcome.wide_final is None
+            else final_state(body, description, outcome.wide_final)
+            for body in description.bodies
         },
         "conserved": {
             quantity.name: {
@@ -116,20 +121,24 @@ def report(
     return said
 
 
-def final_state(body: str, description: Description, row: Vector) -> dict[str, Any]:
+def final_state(body: str, description: Description, row: NDArray[Float]) -> dict[str, Any]:
     """The state of one body in a row of the trajectory, as `run.json` tells it."""
     index = description.column_index
-    motor = {blade: float(row[index[f"{body}.motor.{blade}"]]) for blade in description.motor}
-    rotation = rotation_matrices({blade: np.array([value]) for blade, value in motor.items()})[0]
+    motor = {blade: row[[index[f"{body}.motor.{blade}"]]] for blade in description.motor}
     return {
-        "motor": motor,
+        "motor": {blade: _number(value[0]) for blade, value in motor.items()},
         "momentum": {
-            name: float(row[index[f"{body}.momentum.{name}"]]) for name in description.momentum
+            name: _number(row[index[f"{body}.momentum.{name}"]]) for name in description.momentum
         },
-        "position": [float(row[k]) for k in description.position_columns(body)],
-        "rotation": rotation.tolist(),
+        "position": [_number(row[k]) for k in description.position_columns(body)],
+        "rotation": [[_number(x) for x in line] for line in rotation_matrices(motor)[0]],
         "scale": 1,
     }
+
+
+def _number(x: np.floating[Any]) -> float | str:
+    """A double as it is; a wider number as the shortest text that reads back as the same."""
+    return float(x) if isinstance(x, np.float64) else str(x)
 
 
 def to_json(said: Mapping[str, Any]) -> str:

@@ -83,7 +83,10 @@ class Run:
 
     @property
     def final(self) -> Mapping[str, Mapping[str, Any]]:
-        """The last state, per body: motor, momentum, position, rotation, scale."""
+        """The last state, per body: motor, momentum, position, rotation, scale.
+
+        Numbers; strings with all digits where the scalar is wider than a double.
+        """
         final: Mapping[str, Mapping[str, Any]] = self.report["final"]
         return final
 

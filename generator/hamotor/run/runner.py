@@ -20,7 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.errors import NumericsError, UsageError
-from hamotor.run.library import Conserved, Description, LiveRun, Rows, SceneLibrary, Vector
+from hamotor.run.library import (
+    Conserved,
+    Description,
+    LiveRun,
+    Rows,
+    SceneLibrary,
+    Vector,
+    WideVector,
+)
 from hamotor.run.progress import NoProgress, Progress
 
 Status = Literal["finished", "interrupted", "failed"]
@@ -130,7 +138,10 @@ class Ladder:
 
 @dataclass(frozen=True)
 class Outcome:
-    """A run after its last step.  `final` is the last row; `problem` says why it failed."""
+    """A run after its last step.  `final` is the last row; `problem` says why it failed.
+
+    `wide_final` is the last row with all digits, where the scalar has more than a double.
+    """
 
     plan: Plan
     status: Status
@@ -144,6 +155,7 @@ class Outcome:
     integrate_s: float
     problem: str = ""
     ladder: Ladder | None = None
+    wide_final: WideVector | None = None
 
     @property
     def ns_per_step(self) -> float:
@@ -293,7 +305,18 @@ def _step_in_chunks(
         total_drift=total,
         integrate_s=seconds,
         problem=problem,
+        wide_final=_wide(live, kept, done),
     )
+
+
+def _wide(live: LiveRun, kept: _KeptRows, done: int) -> WideVector | None:
+    if not live.description.is_wide:
+        return None
+    if kept.step < done:  # the state now is not the last row, which was rounded
+        return kept.last.astype(np.longdouble)
+    row = live.observe_wide()
+    row[0] = kept.last[0]
+    return row
 
 
 class _KeptRows:

@@ -325,8 +325,9 @@ class Run {
   }
 
   /// One row of columns.
-  void observe(double* row) const noexcept {
-    *row++ = static_cast<double>(now());
+  template <class Number>
+  void observe(Number* row) const noexcept {
+    *row++ = static_cast<Number>(now());
     std::array<Momentum, n> spatial{};
     for (std::size_t i = 0; i < n; ++i) {
       const Motor motor = user_motor(i);
@@ -338,11 +339,11 @@ class Run {
     for (std::size_t i = 1; i < n; ++i) spatial[0] = spatial[0] + spatial[i];
     const auto total = spatial[0].components();
     const S energy = Scene::system.energy(state_);
-    *row++ = static_cast<double>(energy);
+    *row++ = static_cast<Number>(energy);
     row = write(total, row);
     for (const auto& conserved : Scene::conserved) {
       if (!has_own_column(conserved)) continue;
-      *row++ = static_cast<double>(conserved.quantity == Quantity::spatial_momentum
+      *row++ = static_cast<Number>(conserved.quantity == Quantity::spatial_momentum
                                        ? combination(conserved.coefficients, total)
                                        : casimir(conserved.quantity, conserved.body));
     }
@@ -434,9 +435,9 @@ class Run {
     return result;
   }
 
-  template <std::size_t size>
-  [[nodiscard]] static double* write(const std::array<S, size>& values, double* to) noexcept {
-    for (const S& x : values) *to++ = static_cast<double>(x);
+  template <class Number, std::size_t size>
+  [[nodiscard]] static Number* write(const std::array<S, size>& values, Number* to) noexcept {
+    for (const S& x : values) *to++ = static_cast<Number>(x);
     return to;
   }
 
@@ -482,6 +483,9 @@ template <SceneDefinition Scene>
     return static_cast<hamotor::scene::Run<Scene>*>(run)->advance(steps, every, rows);   \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {              \
+    static_cast<const hamotor::scene::Run<Scene>*>(run)->observe(row);                   \
+  }                                                                                      \
+  HAMOTOR_SCENE_EXPORT void hamotor_observe_wide(const void* run, long double* row) {    \
     static_cast<const hamotor::scene::Run<Scene>*>(run)->observe(row);                   \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {              \
