@@ -1,0 +1,405 @@
+"""One body on a group of rotors, in symbols: its momenta, and where it is.
+
+Where a body is, is a motor M. A Hamiltonian speaks of it through a few functions of M: on groups
+that act affinely, x_world = x + s R x_body, the variables x, R and s; otherwise the components of
+M themselves. Points of the body are variables too. Each variable knows what it is in M and its
+derivative along M exp(εE_i), from which every forque follows: F_b,i = Σ (∂H/∂q) δ_i q.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import sympy
+
+from hamotor.codegen.algebra import (
+    Algebra,
+    Blade,
+    Multivector,
+    Rational,
+    add_scaled,
+    reverse_sign,
+)
+from hamotor.codegen.group import LieGroup
+
+Expr = Any
+"""A SymPy expression; SymPy has no types of its own."""
+Linear = tuple[tuple[Rational, ...], ...]
+"""A matrix of exact numbers, rows first."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A function of the motor that Hamiltonians are written in."""
+
+    symbol: Expr
+    definition: Expr
+    """In the motor's components, and in variables that stand before it."""
+    variation: tuple[Expr, ...]
+    """δ_i, its derivative along M exp(εE_i), one for each generator, in variables."""
+    spatial_variation: tuple[Expr, ...]
+    """Its derivative along exp(εE_i) M, one for each generator, in variables."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A point of the body, y = x + s R a in the world.
+
+    Its derivative along M exp(εE_i) is s R ξ_i(a): a gradient g pulled back to the body, s Rᵀ g,
+    is all that a forque needs.
+    """
+
+    symbols: tuple[Expr, ...]
+    """y."""
+    place: tuple[Expr, ...]
+    """a, in the body frame, m."""
+    velocities: tuple[tuple[Expr, ...], ...]
+    """ξ_i(a), what each generator does to a."""
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """Symbols of one body on `group`; those of several bodies differ by the prefix `BODY.`."""
+
+    body: str
+    algebra: Algebra
+    group: LieGroup
+    prefix: str = ""
+    _points: dict[tuple[Expr, ...], Point] = field(default_factory=dict, repr=False, compare=False)
+
+    def _symbol(self, name: str) -> Expr:
+        return sympy.Symbol(self.prefix + name, real=True)
+
+    @cached_property
+    def motor(self) -> tuple[Expr, ...]:
+        """The components of M, in storage order."""
+        return tuple(self._symbol(c.name) for c in self.group.element.components)
+
+    @cached_property
+    def rates(self) -> tuple[Expr, ...]:
+        """The components of B, physical, body frame."""
+        return tuple(self._symbol(g.rate) for g in self.group.generators)
+
+    @cached_property
+    def momenta(self) -> tuple[Expr, ...]:
+        """The components of μ, physical, body frame."""
+        return tuple(self._symbol(g.momentum) for g in self.group.generators)
+
+    @cached_property
+    def space(self) -> Space:
+        """How the group acts on the points of its space."""
+        return Space.of(self.algebra, self.group)
+
+    @property
+    def dimension(self) -> int:
+        """Of the space that the body is in."""
+        return len(self.space.directions)
+
+    # ------------------------------------------------------------------ where the body is
+
+    @cached_property
+    def rotation(self) -> tuple[tuple[Expr, ...], ...]:
+        """R[j][k], the component along j of the world's image of the body's direction k."""
+        d = range(self.dimension)
+        return tuple(tuple(self._symbol(f"R{j + 1}{k + 1}") for k in d) for j in d)
+
+    @cached_property
+    def scale(self) -> Expr:
+        """s, by how much the body is enlarged; 1 where the group keeps lengths."""
+        return self._symbol("scale") if self.space.scales else sympy.Integer(1)
+
+    @cached_property
+    def motor_variables(self) -> tuple[Variable, ...]:
+        """The components of M as variables: δ_i M = M E_i, and E_i M for the world's E_i."""
+        body = [self._motor_times(g.bivector, from_left=False) for g in self.group.generators]
+        world = [self._motor_times(g.bivector, from_left=True) for g in self.group.generators]
+        return tuple(
+            Variable(symbol, symbol, tuple(c[k] for c in body), tuple(c[k] for c in world))
+            for k, symbol in enumerate(self.motor)
+        )
+
+    def _motor_times(self, bivector: Mapping[Blade, Rational], *, from_left: bool) -> list[Expr]:
+        """The components of M E, or of E M."""
+        total: dict[Blade, Expr] = {}
+        for symbol, component in zip(self.motor, self.group.element.components, strict=True):
+            factors = (component.embedding, bivector)
+            for blade, x in self.algebra.multiply(*factors[:: -1 if from_left else 1]).items():
+                total[blade] = total.get(blade, 0) + symbol * _exact(x)
+        return [
+            _sum(_exact(x) * total.get(blade, 0) for blade, x in reading.items())
+            for reading in self.group.element.reading
+        ]
+
+    @cached_property
+    def affine_variables(self) -> tuple[Variable, ...]:
+        """R and s as variables; none where the group does not act affinely."""
+        space = self.space
+        if not space.affine:
+            return ()
+        image = self.image
+        d = range(self.dimension)
+        variables = []
+        if space.scales:
+            growth = tuple(self.scale * _exact(x) for x in space.growths)
+            definition = image[space.infinity][space.infinity]
+            variables.append(Variable(self.scale, definition, growth, growth))
+        variables += [
+            Variable(
+                self.rotation[j][k],
+                image[j + 1][k + 1],
+                tuple(
+                    _sum(self.rotation[j][n] * _exact(turn[n][k]) for n in d)
+                    for turn in space.turns
+                ),
+                tuple(
+                    _sum(_exact(turn[j][n]) * self.rotation[n][k] for n in d)
+                    for turn in space.turns
+                ),
+            )
+            for j in d
+            for k in d
+        ]
+        return tuple(variables)
+
+    @cached_property
+    def variables(self) -> dict[Expr, Variable]:
+        """Every variable by its symbol."""
+        return {v.symbol: v for v in (*self.affine_variables, *self.motor_variables)}
+
+    @cached_property
+    def origin(self) -> tuple[Expr, ...]:
+        """x in the components of M; zeros where the group fixes the origin."""
+        if not self.space.translates:
+            return (sympy.Integer(0),) * self.dimension
+        return tuple(self.scale * self.image[j + 1][0] for j in range(self.dimension))
+
+    def at(self, place: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        """Where a point of the body frame is in the world, y: symbols of a `Point`.
+
+        On groups that bend straight lines, expressions in the components of M.
+        """
+        if not self.space.affine:
+            return self._conformal_point(place)
+        if place not in self._points:
+            name = "x" if not any(place) else f"y{1 + sum(any(a) for a in self._points)}"
+            self._points[place] = Point(
+                tuple(self._symbol(f"{name}{axis}") for axis in "xyzw"[: self.dimension]),
+                place,
+                tuple(
+                    tuple(
+                        _exact(v[j])
+                        + _sum(_exact(turn[j][k]) * a for k, a in enumerate(place))
+                        + _exact(growth) * place[j]
+                        for j in range(self.dimension)
+                    )
+                    for v, turn, growth in zip(
+                        self.space.velocities, self.space.turns, self.space.growths, strict=True
+                    )
+                ),
+            )
+        return self._points[place].symbols
+
+    @property
+    def position(self) -> tuple[Expr, ...]:
+        """Where the body frame's origin is in the world."""
+        return self.at((sympy.Integer(0),) * self.dimension)
+
+    def points_in(self, symbols: set[Expr]) -> tuple[Point, ...]:
+        """The points of which a coordinate is among the symbols."""
+        return tuple(p for p in self._points.values() if symbols & set(p.symbols))
+
+    def definition(self, point: Point) -> tuple[Expr, ...]:
+        """x + s R a, x in the components of M."""
+        turned = self.turned(point.place)
+        return tuple(x + self.scale * y for x, y in zip(self.origin, turned, strict=True))
+
+    def pulled_back(self, gradient: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        """s Rᵀ g, for the gradient g of a potential at a point of the body."""
+        return tuple(self.scale * x for x in self.turned_back(gradient))
+
+    def spatial_velocity(self, generator: int, y: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        """ξ_i(y), what generator i of the world does to a point of the world."""
+        space = self.space
+        velocity, turn, growth = (
+            x[generator] for x in (space.velocities, space.turns, space.growths)
+        )
+        return tuple(
+            _exact(velocity[j])
+            + _sum(_exact(turn[j][k]) * x for k, x in enumerate(y))
+            + _exact(growth) * y[j]
+            for j in range(self.dimension)
+        )
+
+    def turned(self, direction: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        """R n: a direction of the body in the world."""
+        return tuple(
+            _sum(r * n for r, n in zip(row, direction, strict=True)) for row in self.rotation
+        )
+
+    def turned_back(self, direction: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        """Rᵀ n: a direction of the world in the body frame."""
+        columns = zip(*self.rotation, strict=True)
+        return tuple(
+            _sum(r * n for r, n in zip(column, direction, strict=True)) for column in columns
+        )
+
+    @cached_property
+    def image(self) -> list[list[Expr]]:
+        """[M e_k M~]_j in the motor's components, M M~ = 1 used on the diagonal; origin first."""
+        space, components = self.space, self.group.element.components
+        symbols = self.motor
+        norm: dict[Blade, Expr] = {}
+        size = space.basis_size
+        image = [[sympy.Integer(0)] * size for _ in range(size)]
+        for a, left in zip(symbols, components, strict=True):
+            for b, right in zip(symbols, components, strict=True):
+                reverse = {blade: reverse_sign(blade) * x for blade, x in right.embedding.items()}
+                for blade, x in self.algebra.multiply(left.embedding, reverse).items():
+                    norm[blade] = norm.get(blade, 0) + _exact(x) * a * b
+                for k in range(size):
+                    column = space.sandwich(left.embedding, k, reverse)
+                    for j, x in column.items():
+                        image[j][k] += _exact(x) * a * b
+        excess = norm.get(0, sympy.Integer(0)) - 1
+        for j in range(1, len(space.directions) + 1):
+            image[j][j] = sympy.expand(image[j][j] - excess)
+        return image
+
+    def _conformal_point(self, point: tuple[Expr, ...]) -> tuple[Expr, ...]:
+        size = self.space.basis_size
+        vector = [sympy.Integer(1), *point, _sum(x * x for x in point) / 2]
+        origin, *moved, _ = (
+            _sum(self.image[j][k] * vector[k] for k in range(size)) for j in range(size)
+        )
+        return tuple(x / origin for x in moved)
+
+
+@dataclass(frozen=True)
+class Space:
+    """How a group acts on the points of the space its algebra is about.
+
+    The vectors e0 (the origin, where there is one), e1 … and e∞ (where there is one) are moved
+    linearly. All numbers are exact.
+    """
+
+    algebra: Algebra
+    origin: int | None
+    directions: tuple[int, ...]
+    at_infinity: int | None
+    generators: tuple[Mapping[Blade, Rational], ...]
+
+    @staticmethod
+    def of(algebra: Algebra, group: LieGroup) -> Space:
+        """Read off the metric: projective (e0² = 0), conformal (e0·e∞ = −1) or of vectors."""
+        n = algebra.dimension
+        null = [not any(row) for row in algebra.gram]
+        generators = tuple(g.bivector for g in group.generators)
+        if null[0] and not any(null[1:]):
+            return Space(algebra, 0, tuple(range(1, n)), None, generators)
+        first, last = algebra.gram[0], algebra.gram[-1]
+        if n > 2 and not first[0] and not last[-1] and first[-1] == -1 and first.count(0) == n - 1:
+            return Space(algebra, 0, tuple(range(1, n - 1)), n - 1, generators)
+        return Space(algebra, None, tuple(range(n)), None, generators)
+
+    @property
+    def basis_size(self) -> int:
+        """Origin, directions and infinity, with a place for the origin even if there is none."""
+        return 1 + len(self.directions) + (self.at_infinity is not None)
+
+    @property
+    def infinity(self) -> int:
+        """Where e∞ stands."""
+        return self.basis_size - 1
+
+    @property
+    def _vectors(self) -> list[int | None]:
+        end = [] if self.at_infinity is None else [self.at_infinity]
+        return [self.origin, *self.directions, *end]
+
+    @property
+    def _is_projective(self) -> bool:
+        return self.origin is not None and self.at_infinity is None
+
+    def _embedded(self, k: int) -> Multivector:
+        """Basis vector k as the multivector that motors act on: in PGA its dual."""
+        vector = self._vectors[k]
+        if vector is None:
+            return {}
+        return self.algebra.complement(1 << vector) if self._is_projective else {1 << vector: 1}
+
+    def _coordinates(self, element: Multivector) -> dict[int, Rational]:
+        found: dict[int, Rational] = {}
+        for k in range(self.basis_size):
+            for blade, sign in self._embedded(k).items():
+                if blade in element:
+                    found[k] = element[blade] * sign
+        return found
+
+    def sandwich(
+        self, left: Mapping[Blade, Rational], k: int, right: Mapping[Blade, Rational]
+    ) -> dict[int, Rational]:
+        """Coordinates of left e_k right."""
+        return self._coordinates(
+            self.algebra.multiply(self.algebra.multiply(left, self._embedded(k)), right)
+        )
+
+    @cached_property
+    def _brackets(self) -> tuple[tuple[dict[int, Rational], ...], ...]:
+        """[E_i, e_k], for each generator and each basis vector."""
+        result = []
+        for generator in self.generators:
+            row = []
+            for k in range(self.basis_size):
+                bracket = self.algebra.multiply(generator, self._embedded(k))
+                back = self.algebra.multiply(self._embedded(k), generator)
+                add_scaled(bracket, back, -1)
+                row.append(self._coordinates(bracket))
+            result.append(tuple(row))
+        return tuple(result)
+
+    @property
+    def affine(self) -> bool:
+        """Whether straight lines stay straight: no generator moves e∞ but by a factor."""
+        if self.at_infinity is None:
+            return True
+        return all(set(row[self.infinity]) <= {self.infinity} for row in self._brackets)
+
+    @cached_property
+    def velocities(self) -> tuple[tuple[Rational, ...], ...]:
+        """Of the origin under each generator."""
+        d = range(1, len(self.directions) + 1)
+        return tuple(tuple(row[0].get(j, 0) for j in d) for row in self._brackets)
+
+    @cached_property
+    def turns(self) -> tuple[Linear, ...]:
+        """Γ_i, what each generator does to directions: Γ[j][k] along j of the image of k."""
+        d = range(1, len(self.directions) + 1)
+        return tuple(tuple(tuple(row[k].get(j, 0) for k in d) for j in d) for row in self._brackets)
+
+    @cached_property
+    def growths(self) -> tuple[Rational, ...]:
+        """σ_i, the relative growth of lengths under each generator."""
+        if self.at_infinity is None:
+            return (0,) * len(self.generators)
+        return tuple(row[self.infinity].get(self.infinity, 0) for row in self._brackets)
+
+    @property
+    def translates(self) -> bool:
+        """Whether the origin moves."""
+        return any(any(v) for v in self.velocities)
+
+    @property
+    def scales(self) -> bool:
+        """Whether lengths change."""
+        return any(self.growths)
+
+
+def _sum(terms: Iterable[Expr]) -> Expr:
+    return sum(terms, sympy.Integer(0))
+
+
+def _exact(x: Rational) -> Expr:
+    return sympy.Rational(x.numerator, x.denominator)

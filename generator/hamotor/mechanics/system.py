@@ -1,0 +1,151 @@
+"""A Hamiltonian as straight-line programs: what a system of the runtime computes in a step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import sympy
+
+from hamotor.codegen.program import Program
+from hamotor.mechanics.coordinates import Coordinates, Expr
+from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
+from hamotor.mechanics.straightline import straight_line
+
+Definition = tuple[Expr, str, Expr]
+"""A symbol, the name it is bound to in C++, and what it stands for."""
+
+
+@dataclass(frozen=True)
+class System:
+    """The programs of a Hamiltonian, its parameters folded in.
+
+    In C++ the motor and the momentum of body k are `m{k}` and `mu{k}`, time is `t`.
+    """
+
+    hamiltonian: Hamiltonian
+
+    @cached_property
+    def names(self) -> dict[Expr, str]:
+        """What comes from outside."""
+        names = {TIME: "t"}
+        for k, body in enumerate(self.hamiltonian.bodies):
+            components = body.group.element.components
+            names |= {s: f"m{k}.{c.name}" for s, c in zip(body.motor, components, strict=True)}
+            generators = body.group.generators
+            names |= {
+                s: f"mu{k}.{g.momentum}" for s, g in zip(body.momenta, generators, strict=True)
+            }
+        return names
+
+    @cached_property
+    def places(self) -> list[Definition]:
+        """Where the bodies are: R, s, x and their points."""
+        found: list[Definition] = []
+        for k, body in enumerate(self.hamiltonian.bodies):
+            found += [
+                (v.symbol, self._name(v.symbol, body, k), v.definition)
+                for v in body.affine_variables
+            ]
+            for point in body.points_in(self._held):
+                definition = body.definition(point)
+                found += [
+                    (symbol, self._name(symbol, body, k), expression)
+                    for symbol, expression in zip(point.symbols, definition, strict=True)
+                ]
+        return found
+
+    @cached_property
+    def _held(self) -> set[Expr]:
+        h = self.hamiltonian
+        expressions = [h.energy, *(x for applied in h.applied for x in applied)]
+        return {symbol for expression in expressions for symbol in expression.free_symbols}
+
+    @staticmethod
+    def _name(symbol: Expr, body: Coordinates, k: int) -> str:
+        return f"{symbol.name.removeprefix(body.prefix)}_{k}"
+
+    def _program(
+        self, outputs: Mapping[str, Expr], between: list[Definition] | None = None
+    ) -> Program:
+        values = self.hamiltonian.parameters
+        folded = {name: _folded(x, values) for name, x in outputs.items()}
+        stages = [*self.places, *(between or [])]
+        definitions = [(s, name, _folded(x, values)) for s, name, x in stages]
+        return straight_line(folded, self.names, definitions)
+
+    @cached_property
+    def energy(self) -> Program:
+        """H, J."""
+        return self._program({"value": self.hamiltonian.energy})
+
+    @cached_property
+    def power(self) -> Program:
+        """dH/dt, W."""
+        return self._program({"value": self.hamiltonian.power})
+
+    @cached_property
+    def gradient(self) -> Program:
+        """B and F of every body: outputs `rate{k}.NAME` and `forque{k}.NAME`."""
+        return self._program(self._rates | self._forques, self._pulls)
+
+    @cached_property
+    def forque(self) -> Program:
+        """F of every body: outputs `forque{k}.NAME`."""
+        return self._program(self._forques, self._pulls)
+
+    @cached_property
+    def _rates(self) -> dict[str, Expr]:
+        h = self.hamiltonian
+        return {
+            f"rate{k}.{g.rate}": rate
+            for k, (body, rates) in enumerate(zip(h.bodies, h.rates, strict=True))
+            for g, rate in zip(body.group.generators, rates, strict=True)
+        }
+
+    @cached_property
+    def _pulls(self) -> list[Definition]:
+        """Gradients at points, in the world and then in the body frame."""
+        found: list[Definition] = []
+        for k, body in enumerate(self.hamiltonian.bodies):
+            for n, (_, gradient) in enumerate(self.hamiltonian.gradients(body), 1):
+                world = _gradient_symbols(body, k, n, "world")
+                found += [
+                    (symbol, f"gradient{n}{axis}_{k}", x)
+                    for symbol, axis, x in zip(world, "xyzw", gradient, strict=False)
+                ]
+                pulled = body.pulled_back(world)
+                found += [
+                    (symbol, f"pull{n}{axis}_{k}", x)
+                    for symbol, axis, x in zip(
+                        _gradient_symbols(body, k, n, "body"), "xyzw", pulled, strict=False
+                    )
+                ]
+        return found
+
+    @cached_property
+    def _forques(self) -> dict[str, Expr]:
+        h = self.hamiltonian
+        outputs = {}
+        for k, body in enumerate(h.bodies):
+            slopes, gradients = h.slopes(body), h.gradients(body)
+            for i, generator in enumerate(body.group.generators):
+                total = sum((slope * v.variation[i] for v, slope in slopes), sympy.Integer(0))
+                for n, (point, _) in enumerate(gradients, 1):
+                    pulled = _gradient_symbols(body, k, n, "body")
+                    total += sum(v * g for v, g in zip(point.velocities[i], pulled, strict=True))
+                if h.applied:
+                    total += h.applied[k][i]
+                outputs[f"forque{k}.{generator.momentum}"] = total
+        return outputs
+
+
+def _gradient_symbols(body: Coordinates, k: int, n: int, frame: str) -> tuple[Expr, ...]:
+    return tuple(
+        sympy.Symbol(f"_{frame}{k}_{n}_{axis}", real=True) for axis in range(body.dimension)
+    )
+
+
+def _folded(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
+    return expression.subs(values) if values else expression
