@@ -29,10 +29,12 @@ namespace hamotor {
 /// What a conserved quantity is computed from.
 enum class Quantity {
   energy,            ///< H
+  energy_balance,    ///< H less the work done by time and by applied forques
   spatial_momentum,  ///< a combination of the total momentum in the world frame
   p_squared,         ///< |P|² of one body, a Casimir
   p_dot_pi,          ///< P·Π of one body, a Casimir
-  pi_squared         ///< |Π|² of one body, a Casimir of the rotations
+  pi_squared,        ///< |Π|² of one body, a Casimir of the rotations
+  own                ///< one of `Scene::quantities`
 };
 
 /// A quantity that the exact motion of a scene keeps constant.
@@ -47,8 +49,21 @@ struct Conserved {
   /// Columns over whose Euclidean norm at the start a relative error is taken; empty names end
   /// them.
   std::array<std::string_view, static_cast<std::size_t>(G::dimension)> norm{};
-  double scale = 0;  ///< what to divide by where there are none; 0: no natural scale
+  double scale = 0;       ///< what to divide by where there are none; 0: no natural scale
+  std::size_t index = 0;  ///< among `Scene::quantities`
 };
+
+/// A scene that says itself where a body is: `place(motor)` are the values of the columns that
+/// `place_names` and `place_units` describe, and it has units for its motors and momenta.
+template <class Scene>
+concept PlacedScene =
+    requires(const typename Scene::Group::template Element<typename Scene::Scalar>& m) {
+      { Scene::place_names.size() } -> std::convertible_to<std::size_t>;
+      { Scene::place_units.size() } -> std::convertible_to<std::size_t>;
+      { Scene::motor_units.size() } -> std::convertible_to<std::size_t>;
+      { Scene::momentum_units.size() } -> std::convertible_to<std::size_t>;
+      { Scene::place(m).size() } -> std::convertible_to<std::size_t>;
+    };
 
 /// What a compiled scene says about itself, as a type.
 template <class Scene>
@@ -82,7 +97,13 @@ inline constexpr auto momentum_size = static_cast<std::size_t>(Scene::Group::dim
 template <class Scene>
 inline constexpr std::size_t body_size = motor_size<Scene> + momentum_size<Scene>;
 template <class Scene>
-inline constexpr std::size_t position_size = Space<typename Scene::Group>::dimension;
+[[nodiscard]] constexpr std::size_t place_size() noexcept {
+  if constexpr (PlacedScene<Scene>) {
+    return Scene::place_names.size();
+  } else {
+    return Space<typename Scene::Group>::dimension;
+  }
+}
 
 /// Whether a quantity has a column of its own: one component of the spatial momentum has one
 /// anyway.
@@ -103,8 +124,8 @@ template <class G>
 
 template <class Scene>
 [[nodiscard]] constexpr std::size_t columns() noexcept {
-  std::size_t count =
-      1 + Scene::bodies.size() * (body_size<Scene> + position_size<Scene>)+1 + momentum_size<Scene>;
+  std::size_t count = 1 + Scene::bodies.size() * (body_size<Scene> + place_size<Scene>()) + 1 +
+                      (PoweredSystem<SystemOf<Scene>> ? 1 : 0) + momentum_size<Scene>;
   for (const auto& conserved : Scene::conserved) count += has_own_column(conserved) ? 1U : 0U;
   return count;
 }
@@ -185,29 +206,46 @@ template <class S>
 template <class Scene>
 [[nodiscard]] std::string columns_json() {
   using Group = typename Scene::Group;
-  constexpr std::size_t rotations = Space<Group>::rotations;
+  constexpr auto& blades = Group::template Element<typename Scene::Scalar>::names;
   JsonList list;
   const auto add = [&](std::string_view name, std::string_view unit, std::string_view frame,
                        std::string_view body) {
     list.add("{\"name\": " + json_string(name) + ", \"unit\": " + json_string(unit) +
              ", \"frame\": " + json_string(frame) + ", \"body\": " + json_string(body) + '}');
   };
-  const auto momentum_unit = [](std::size_t k) { return k < rotations ? "kg m^2/s" : "kg m/s"; };
+  const auto momentum_unit = [](std::size_t k) -> std::string_view {
+    if constexpr (PlacedScene<Scene>) {
+      return Scene::momentum_units[k];
+    } else {
+      return k < Space<Group>::rotations ? "kg m^2/s" : "kg m/s";
+    }
+  };
+  const auto motor_unit = [&](std::size_t k) -> std::string_view {
+    if constexpr (PlacedScene<Scene>) {
+      return Scene::motor_units[k];
+    } else {
+      return is_ideal(blades[k]) ? "m" : "1";
+    }
+  };
   add("t", "s", "", "");
   for (const std::string_view body : Scene::bodies) {
     const std::string name(body);
-    for (const std::string_view blade : Group::template Element<typename Scene::Scalar>::names) {
-      add(name + ".motor." + std::string(blade), is_ideal(blade) ? "m" : "1", "body to world",
-          body);
+    for (std::size_t k = 0; k < blades.size(); ++k) {
+      add(name + ".motor." + std::string(blades[k]), motor_unit(k), "body to world", body);
     }
     for (std::size_t k = 0; k < Group::generators.size(); ++k) {
       add(name + ".momentum." + std::string(Group::generators[k]), momentum_unit(k), "body", body);
     }
-    for (std::size_t k = 0; k < position_size<Scene>; ++k) {
-      add(name + ".position." + "xyz"[k], "m", "world", body);
+    for (std::size_t k = 0; k < place_size<Scene>(); ++k) {
+      if constexpr (PlacedScene<Scene>) {
+        add(name + '.' + std::string(Scene::place_names[k]), Scene::place_units[k], "world", body);
+      } else {
+        add(name + ".position." + "xyz"[k], "m", "world", body);
+      }
     }
   }
   add("energy", "J", "", "");
+  if constexpr (PoweredSystem<SystemOf<Scene>>) add("work", "J", "", "");
   for (std::size_t k = 0; k < Group::generators.size(); ++k) {
     add("spatial_momentum." + std::string(Group::generators[k]), momentum_unit(k), "world", "");
   }
@@ -215,7 +253,8 @@ template <class Scene>
     if (!has_own_column(conserved)) continue;
     const bool momentum = conserved.quantity == Quantity::spatial_momentum;
     add(conserved.name, conserved.unit, momentum ? "world" : "body",
-        momentum ? std::string_view{} : Scene::bodies[conserved.body]);
+        momentum || conserved.quantity == Quantity::energy_balance ? std::string_view{}
+                                                                   : Scene::bodies[conserved.body]);
   }
   return list.text();
 }
@@ -300,7 +339,6 @@ class Run {
   using G = typename Scene::Group;
   using Motor = typename G::template Element<S>;
   using Momentum = typename G::template Momentum<S>;
-  using Point = typename Space<G>::template Point<S>;
   static constexpr std::size_t n = System::bodies;
 
  public:
@@ -333,19 +371,18 @@ class Run {
       const Motor motor = user_motor(i);
       row = write(motor.components(), row);
       row = write(user_momentum(i).components(), row);
-      row = write(position(i, motor), row);
+      row = write(place(i, motor), row);
       spatial[i] = Ad_star_inverse(state_.motors[i], state_.momenta[i]);
     }
     for (std::size_t i = 1; i < n; ++i) spatial[0] = spatial[0] + spatial[i];
     const auto total = spatial[0].components();
-    const S energy = Scene::system.energy(state_);
-    *row++ = static_cast<Number>(energy);
+    const S h = energy(Scene::system, state_, now());
+    *row++ = static_cast<Number>(h);
+    if constexpr (PoweredSystem<System>) *row++ = static_cast<Number>(work_);
     row = write(total, row);
     for (const auto& conserved : Scene::conserved) {
       if (!has_own_column(conserved)) continue;
-      *row++ = static_cast<Number>(conserved.quantity == Quantity::spatial_momentum
-                                       ? combination(conserved.coefficients, total)
-                                       : casimir(conserved.quantity, conserved.body));
+      *row++ = static_cast<Number>(value_of(conserved, h, total));
     }
   }
 
@@ -373,6 +410,7 @@ class Run {
       }
       state_ = state;
       drift_ = method.drift();
+      if constexpr (PoweredSystem<System>) work_ = method.work();
       ++index_;
       if (rows != nullptr && every > 0 && index_ % every == 0) {
         observe(rows);
@@ -392,11 +430,13 @@ class Run {
     return Ad_star_inverse(Scene::frames[i], state_.momenta[i]);
   }
 
-  [[nodiscard]] static auto position(std::size_t i, const Motor& motor) noexcept {
-    if constexpr (Space<G>::translates) {
+  [[nodiscard]] static auto place([[maybe_unused]] std::size_t i, const Motor& motor) noexcept {
+    if constexpr (PlacedScene<Scene>) {
+      return Scene::place(motor);
+    } else if constexpr (Space<G>::translates) {
       return sandwich(motor, typename Space<G>::template Origin<S>{}).components();
     } else {
-      std::array<S, position_size<Scene>> where{};
+      std::array<S, place_size<Scene>()> where{};
       Scene::system.for_each_body([&](auto k, const auto& body) {
         if (k == i) where = body.fixed_point();
       });
@@ -411,6 +451,21 @@ class Run {
       if (coefficients[k] != 0) sum = mul_add(S(coefficients[k]), total[k], sum);
     }
     return sum;
+  }
+
+  [[nodiscard]] S value_of(const Conserved<G>& conserved, const S& h,
+                           const std::array<S, momentum_size<Scene>>& total) const noexcept {
+    if (conserved.quantity == Quantity::spatial_momentum) {
+      return combination(conserved.coefficients, total);
+    }
+    if constexpr (PoweredSystem<System>) {
+      if (conserved.quantity == Quantity::energy_balance) return h - work_;
+    }
+    if constexpr (requires { Scene::quantities(state_, time_); }) {
+      return Scene::quantities(state_, now())[conserved.index];
+    } else {
+      return casimir(conserved.quantity, conserved.body);
+    }
   }
 
   [[nodiscard]] S casimir(Quantity quantity, std::size_t i) const noexcept {
@@ -446,6 +501,7 @@ class Run {
   S step_;
   StateOf<System> state_{};
   Drift<S> drift_;
+  S work_{};
   std::int64_t index_ = 0;
   bool failed_ = false;
 };

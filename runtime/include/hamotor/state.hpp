@@ -52,32 +52,90 @@ concept LieGroup =
       { mul_add(x, mu, mu) } -> std::same_as<typename G::template Momentum<S>>;
     };
 
-/// A Hamiltonian system on N copies of a group: Ṁ = M B, μ̇ = [μ, B] − F with B = `rate` = ∂H/∂μ and
-/// F = `forque`, the body forque M~ F_s M = +dH (theory: minus the force), both for every body.
+/// The gradient of H at a state: for every body the rate B = ∂H/∂μ and the body forque
+/// F = M~ F_s M = +dH (theory: minus the force), so that Ṁ = M B and μ̇ = [μ, B] − F.
+template <class G, std::size_t N, class S>
+struct Gradient {
+  std::array<typename G::template Rate<S>, N> rates;
+  std::array<typename G::template Momentum<S>, N> forques;
+};
+
+/// A system H = T(μ) + U(M) that says ∂T/∂μ by `rate` and dU by `forque`.
 ///
 /// A system in which nothing acts says so by `has_forque = false` and needs no forque.
 template <class System>
-concept HamiltonianSystem =
-    LieGroup<typename System::Group, typename System::Scalar> &&
+concept SeparableSystem = requires(
+    const System& system,
+    const State<typename System::Group, System::bodies, typename System::Scalar>& state) {
+  { system.energy(state) } -> std::same_as<typename System::Scalar>;
+  {
+    system.rate(state)
+  } -> std::same_as<
+      std::array<typename System::Group::template Rate<typename System::Scalar>, System::bodies>>;
+  { System::has_forque } -> std::convertible_to<bool>;
+  requires !System::has_forque || requires {
+    {
+      system.forque(state.motors)
+    } -> std::same_as<std::array<typename System::Group::template Momentum<typename System::Scalar>,
+                                 System::bodies>>;
+  };
+};
+
+/// A system with any H(M, μ, t), and forques of no potential if there are: the whole gradient at
+/// once, at a time.
+template <class System>
+concept GeneralSystem =
     requires(const System& system,
-             const State<typename System::Group, System::bodies, typename System::Scalar>& state) {
-      { system.energy(state) } -> std::same_as<typename System::Scalar>;
+             const State<typename System::Group, System::bodies, typename System::Scalar>& state,
+             const typename System::Scalar& t) {
+      { system.energy(state, t) } -> std::same_as<typename System::Scalar>;
       {
-        system.rate(state)
-      } -> std::same_as<std::array<typename System::Group::template Rate<typename System::Scalar>,
-                                   System::bodies>>;
+        system.gradient(state, t)
+      } -> std::same_as<Gradient<typename System::Group, System::bodies, typename System::Scalar>>;
       { System::has_forque } -> std::convertible_to<bool>;
-      requires !System::has_forque || requires {
-        {
-          system.forque(state.motors)
-        } -> std::same_as<std::array<
-            typename System::Group::template Momentum<typename System::Scalar>, System::bodies>>;
-      };
     };
+
+/// A Hamiltonian system on N copies of a group.
+template <class System>
+concept HamiltonianSystem = LieGroup<typename System::Group, typename System::Scalar> &&
+                            (SeparableSystem<System> || GeneralSystem<System>);
+
+/// A system whose energy is not constant by itself: `power(state, t)` is dH/dt, W.
+template <class System>
+concept PoweredSystem = GeneralSystem<System> && requires(const System& system) {
+  system.power(State<typename System::Group, System::bodies, typename System::Scalar>{},
+               typename System::Scalar{});
+};
 
 /// The state space of a system.
 template <class System>
 using StateOf = State<typename System::Group, System::bodies, typename System::Scalar>;
+
+/// The gradient of H at a state and a time; a separable system's forque only where it has one.
+template <HamiltonianSystem System>
+[[nodiscard]] constexpr auto gradient(const System& system, const StateOf<System>& state,
+                                      const typename System::Scalar& t) noexcept {
+  if constexpr (GeneralSystem<System>) {
+    return system.gradient(state, t);
+  } else {
+    Gradient<typename System::Group, System::bodies, typename System::Scalar> result{
+        system.rate(state), {}};
+    if constexpr (System::has_forque) result.forques = system.forque(state.motors);
+    return result;
+  }
+}
+
+/// H at a state and a time, J.
+template <HamiltonianSystem System>
+[[nodiscard]] constexpr typename System::Scalar energy(const System& system,
+                                                       const StateOf<System>& state,
+                                                       const typename System::Scalar& t) noexcept {
+  if constexpr (GeneralSystem<System>) {
+    return system.energy(state, t);
+  } else {
+    return system.energy(state);
+  }
+}
 
 /// By how much a state changes: what is to be added to its motors and momenta.
 template <class System>
@@ -92,7 +150,7 @@ struct ChangeOf {
 /// composition of exact flows: `free_change(motors, momenta, h)` is what it adds in the time h.
 template <class System>
 concept SplitSystem =
-    HamiltonianSystem<System> &&
+    HamiltonianSystem<System> && SeparableSystem<System> &&
     requires(const System& system, const StateOf<System>& state, typename System::Scalar h) {
       { system.free_change(state.motors, state.momenta, h) } -> std::same_as<ChangeOf<System>>;
     };

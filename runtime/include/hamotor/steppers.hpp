@@ -77,13 +77,13 @@ class Rkmk4 {
   static constexpr std::string_view name = "rkmk4";
 
   /// Takes `state` from t to t + h.
-  constexpr void do_step(const System& system, StateOf<System>& state, const S& /*t*/,
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
     const S half_step = S(0.5) * h;
-    const Slope one = slope(system, state, Rates{});
-    const Slope two = slope_at(system, state, half_step, one);
-    const Slope three = slope_at(system, state, half_step, two);
-    const Slope four = slope_at(system, state, h, three);
+    const Slope one = slope(system, state, t, Rates{});
+    const Slope two = slope_at(system, state, t, half_step, one);
+    const Slope three = slope_at(system, state, t, half_step, two);
+    const Slope four = slope_at(system, state, t, h, three);
 
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
@@ -98,37 +98,49 @@ class Rkmk4 {
       motor = motor + Space<G>::unit_correction(motor, defect);
       state.momenta[i] = mul_add(h / S(6), force, state.momenta[i]);
     }
+    if constexpr (PoweredSystem<System>) {
+      work_ =
+          mul_add(h / S(6), mul_add(S(2), two.power + three.power, one.power + four.power), work_);
+    }
     detail::record(drift_, worst);
   }
 
   /// How far the steps so far left the group.
   [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
 
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return work_;
+  }
+
  private:
-  /// Ẋ and μ̇.
+  /// Ẋ, μ̇ and dH/dt.
   struct Slope {
     Rates rate;
     Momenta force;
+    S power{};
   };
 
   /// At the state, in the coordinate X.
   [[nodiscard]] static constexpr Slope slope(const System& system, const StateOf<System>& state,
-                                             const Rates& x) noexcept {
-    Slope result{system.rate(state), {}};
+                                             const S& t, const Rates& x) noexcept {
+    const auto now = gradient(system, state, t);
+    Slope result{};
     for (std::size_t i = 0; i < n; ++i) {
-      result.force[i] = coadjoint(result.rate[i], state.momenta[i]);
-      result.rate[i] = detail::dexp_inverse(x[i], result.rate[i], S(0.5));
+      result.force[i] = coadjoint(now.rates[i], state.momenta[i]);
+      result.rate[i] = detail::dexp_inverse(x[i], now.rates[i], S(0.5));
+      if constexpr (System::has_forque) result.force[i] = result.force[i] - now.forques[i];
     }
-    if constexpr (System::has_forque) {
-      const auto forque = system.forque(state.motors);
-      for (std::size_t i = 0; i < n; ++i) result.force[i] = result.force[i] - forque[i];
-    }
+    if constexpr (PoweredSystem<System>) result.power = system.power(state, t);
     return result;
   }
 
-  /// At the time h after `state` if `before` were the slope in between.
+  /// At the time h after `state` at t if `before` were the slope in between.
   [[nodiscard]] static constexpr Slope slope_at(const System& system, const StateOf<System>& state,
-                                                const S& h, const Slope& before) noexcept {
+                                                const S& t, const S& h,
+                                                const Slope& before) noexcept {
     StateOf<System> there = state;
     Rates x{};
     for (std::size_t i = 0; i < n; ++i) {
@@ -136,10 +148,11 @@ class Rkmk4 {
       there.momenta[i] = mul_add(h, before.force[i], state.momenta[i]);
       if constexpr (System::has_forque) there.motors[i] = gp(state.motors[i], exp(x[i]));
     }
-    return slope(system, there, x);
+    return slope(system, there, t + h, x);
   }
 
   Drift<S> drift_;
+  S work_{};
 };
 
 /// Strang splitting, order 2, symmetric and symplectic: half a kick, the free motion, half a kick,
@@ -245,8 +258,21 @@ class Splitting2 {
   Drift<S> drift_;
 };
 
+namespace detail {
+
+template <class System>
+struct Steppers {
+  using type = std::tuple<Rkmk4<System>>;
+};
+template <SplitSystem System>
+struct Steppers<System> {
+  using type = std::tuple<Rkmk4<System>, Splitting2<System>>;
+};
+
+}  // namespace detail
+
 /// The steppers that a system can be stepped with.
 template <class System>
-using SteppersOf = std::tuple<Rkmk4<System>, Splitting2<System>>;
+using SteppersOf = typename detail::Steppers<System>::type;
 
 }  // namespace hamotor
