@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 import sympy
@@ -52,6 +52,7 @@ def straight_line(
     definitions: symbols with the name they are bound to and what they stand for, each in what
         stands before it; only those that the outputs need are computed.
     """
+    definitions, outputs = _constants_folded(definitions, outputs)
     needed = _needed(outputs.values(), definitions)
     stages = [*((name, expression) for _, name, expression in needed), *outputs.items()]
     known = dict(names) | {symbol: name for symbol, name, _ in needed}
@@ -65,10 +66,30 @@ def straight_line(
     )
 
 
+def _constants_folded(
+    definitions: Sequence[tuple[Expr, str, Expr]], outputs: Mapping[str, Expr]
+) -> tuple[list[tuple[Expr, str, Expr]], dict[str, Expr]]:
+    """Definitions that are plain numbers put in where they are used."""
+    constants: dict[Expr, Expr] = {}
+    kept = []
+    for symbol, name, expression in definitions:
+        value = _with(expression, constants)
+        if value.is_Rational:
+            constants[symbol] = value
+        else:
+            kept.append((symbol, name, value))
+    return kept, {name: _with(x, constants) for name, x in outputs.items()}
+
+
+def _with(expression: Expr, constants: Mapping[Expr, Expr]) -> Expr:
+    held = {s: x for s, x in constants.items() if s in expression.free_symbols}
+    return expression.subs(held) if held else expression
+
+
 def _needed(
-    wanted: object, definitions: Sequence[tuple[Expr, str, Expr]]
+    wanted: Iterable[Expr], definitions: Sequence[tuple[Expr, str, Expr]]
 ) -> list[tuple[Expr, str, Expr]]:
-    symbols = {s for expression in wanted for s in expression.free_symbols}  # type: ignore[attr-defined]
+    symbols = {s for expression in wanted for s in expression.free_symbols}
     kept = []
     for definition in reversed(definitions):
         if definition[0] in symbols:

@@ -148,4 +148,5 @@ def _gradient_symbols(body: Coordinates, k: int, n: int, frame: str) -> tuple[Ex
 
 
 def _folded(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
-    return expression.subs(values) if values else expression
+    held = {s: x for s, x in values.items() if s in expression.free_symbols}
+    return expression.subs(held) if held else expression
