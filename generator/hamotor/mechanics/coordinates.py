@@ -223,9 +223,8 @@ class Coordinates:
     def spatial_velocity(self, generator: int, y: tuple[Expr, ...]) -> tuple[Expr, ...]:
         """ξ_i(y), what generator i of the world does to a point of the world."""
         space = self.space
-        velocity, turn, growth = (
-            x[generator] for x in (space.velocities, space.turns, space.growths)
-        )
+        velocity, turn = space.velocities[generator], space.turns[generator]
+        growth = space.growths[generator]
         return tuple(
             _exact(velocity[j])
             + _sum(_exact(turn[j][k]) * x for k, x in enumerate(y))

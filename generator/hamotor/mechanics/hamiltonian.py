@@ -93,9 +93,7 @@ class Hamiltonian:
                 + sum(
                     v * g
                     for point, gradient in self.gradients(body)
-                    for v, g in zip(
-                        body.spatial_velocity(i, point.symbols), gradient, strict=True
-                    )
+                    for v, g in zip(body.spatial_velocity(i, point.symbols), gradient, strict=True)
                 )
                 for i in range(len(body.momenta))
             )

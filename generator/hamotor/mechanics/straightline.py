@@ -99,7 +99,7 @@ def _needed(
 
 
 class _Scheduler:
-    """Binds each shared expression right before its first use, under a name t1, t2, …"""
+    """Binds each shared expression right before its first use, under a name t1, t2, …."""
 
     def __init__(self, names: Mapping[Expr, str], shared: Sequence[tuple[Expr, Expr]]) -> None:
         self.names = dict(names)
@@ -187,9 +187,7 @@ class _Scheduler:
         negate = bool(coefficient < 0)
         size = abs(coefficient)
         factors = [self.expression(f) for f in above]
-        if size != 1 and (above or not below):
-            factors.insert(0, self.expression(size))
-        elif below and not above:
+        if size != 1 or not above:
             factors.insert(0, self.expression(size))
         value = _times(factors)
         if negate:

@@ -14,6 +14,7 @@ from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.hamiltonian import TIME
 from hamotor.mechanics.language import Argument, Body, Function, Record, Value, Vector, Vocabulary
 
+
 @dataclass(frozen=True)
 class Speaker:
     """One body as an expression knows it.
