@@ -60,7 +60,7 @@ def values_at(body: Coordinates, motor: Multivector) -> dict[Any, Any]:
         for r in body.group.element.reading
     ]
     known = dict(zip(body.motor, components, strict=True))
-    stages = [(v.symbol, v.definition) for v in body.affine_variables]
+    stages = [(v.symbol, v.definition) for v in body.frame_variables]
     for point in body._points.values():
         stages += zip(point.symbols, body.definition(point), strict=True)
     for symbol, definition in stages:

@@ -1,8 +1,8 @@
 """One body on a group of rotors, in symbols: its momenta, and where it is.
 
 Where a body is, is a motor M. A Hamiltonian speaks of it through a few functions of M: on groups
-that act affinely, x_world = x + s R x_body, the variables x, R and s; otherwise the components of
-M themselves. Points of the body are variables too. Each variable knows what it is in M and its
+that act affinely, x_world = x + s R x_body, the variables x, R and s; on conformal ones the matrix
+L of e_k ↦ M e_k M~, in which points are quotients; and the components of M themselves. Points of the body are variables too. Each variable knows what it is in M and its
 derivative along M exp(εE_i), from which every forque follows: F_b,i = Σ (∂H/∂q) δ_i q.
 """
 
@@ -134,11 +134,11 @@ class Coordinates:
         ]
 
     @cached_property
-    def affine_variables(self) -> tuple[Variable, ...]:
-        """R and s as variables; none where the group does not act affinely."""
+    def frame_variables(self) -> tuple[Variable, ...]:
+        """R and s as variables; L where the group does not act affinely."""
         space = self.space
         if not space.affine:
-            return ()
+            return self._conformal_variables
         image = self.image
         d = range(self.dimension)
         variables = []
@@ -164,10 +164,36 @@ class Coordinates:
         ]
         return tuple(variables)
 
+    @property
+    def _conformal_variables(self) -> tuple[Variable, ...]:
+        size = range(self.space.basis_size)
+        brackets = self.space.brackets
+        matrix = self.conformal_matrix
+        return tuple(
+            Variable(
+                matrix[j][k],
+                self.image[j][k],
+                tuple(
+                    _sum(matrix[j][n] * _exact(x) for n, x in row[k].items()) for row in brackets
+                ),
+                tuple(
+                    _sum(_exact(row[n].get(j, 0)) * matrix[n][k] for n in size) for row in brackets
+                ),
+            )
+            for j in size
+            for k in size
+        )
+
+    @cached_property
+    def conformal_matrix(self) -> tuple[tuple[Expr, ...], ...]:
+        """L[j][k] = [M e_k M~]_j over e0, e1, …, e∞."""
+        size = range(self.space.basis_size)
+        return tuple(tuple(self._symbol(f"L{j}{k}") for k in size) for j in size)
+
     @cached_property
     def variables(self) -> dict[Expr, Variable]:
         """Every variable by its symbol."""
-        return {v.symbol: v for v in (*self.affine_variables, *self.motor_variables)}
+        return {v.symbol: v for v in (*self.frame_variables, *self.motor_variables)}
 
     @cached_property
     def origin(self) -> tuple[Expr, ...]:
@@ -179,7 +205,7 @@ class Coordinates:
     def at(self, place: tuple[Expr, ...]) -> tuple[Expr, ...]:
         """Where a point of the body frame is in the world, y: symbols of a `Point`.
 
-        On groups that bend straight lines, expressions in the components of M.
+        On groups that bend straight lines, quotients in L.
         """
         if not self.space.affine:
             return self._conformal_point(place)
@@ -268,10 +294,9 @@ class Coordinates:
         return image
 
     def _conformal_point(self, point: tuple[Expr, ...]) -> tuple[Expr, ...]:
-        size = self.space.basis_size
         vector = [sympy.Integer(1), *point, _sum(x * x for x in point) / 2]
         origin, *moved, _ = (
-            _sum(self.image[j][k] * vector[k] for k in range(size)) for j in range(size)
+            _sum(x * y for x, y in zip(row, vector, strict=True)) for row in self.conformal_matrix
         )
         return tuple(x / origin for x in moved)
 
@@ -346,7 +371,7 @@ class Space:
         )
 
     @cached_property
-    def _brackets(self) -> tuple[tuple[dict[int, Rational], ...], ...]:
+    def brackets(self) -> tuple[tuple[dict[int, Rational], ...], ...]:
         """[E_i, e_k], for each generator and each basis vector."""
         result = []
         for generator in self.generators:
@@ -364,26 +389,26 @@ class Space:
         """Whether straight lines stay straight: no generator moves e∞ but by a factor."""
         if self.at_infinity is None:
             return True
-        return all(set(row[self.infinity]) <= {self.infinity} for row in self._brackets)
+        return all(set(row[self.infinity]) <= {self.infinity} for row in self.brackets)
 
     @cached_property
     def velocities(self) -> tuple[tuple[Rational, ...], ...]:
         """Of the origin under each generator."""
         d = range(1, len(self.directions) + 1)
-        return tuple(tuple(row[0].get(j, 0) for j in d) for row in self._brackets)
+        return tuple(tuple(row[0].get(j, 0) for j in d) for row in self.brackets)
 
     @cached_property
     def turns(self) -> tuple[Linear, ...]:
         """Γ_i, what each generator does to directions: Γ[j][k] along j of the image of k."""
         d = range(1, len(self.directions) + 1)
-        return tuple(tuple(tuple(row[k].get(j, 0) for k in d) for j in d) for row in self._brackets)
+        return tuple(tuple(tuple(row[k].get(j, 0) for k in d) for j in d) for row in self.brackets)
 
     @cached_property
     def growths(self) -> tuple[Rational, ...]:
         """σ_i, the relative growth of lengths under each generator."""
         if self.at_infinity is None:
             return (0,) * len(self.generators)
-        return tuple(row[self.infinity].get(self.infinity, 0) for row in self._brackets)
+        return tuple(row[self.infinity].get(self.infinity, 0) for row in self.brackets)
 
     @property
     def translates(self) -> bool:

@@ -46,7 +46,7 @@ class System:
         for k, body in enumerate(self.hamiltonian.bodies):
             found += [
                 (v.symbol, self._name(v.symbol, body, k), v.definition)
-                for v in body.affine_variables
+                for v in body.frame_variables
             ]
             for point in body.points_in(self._held):
                 definition = body.definition(point)
