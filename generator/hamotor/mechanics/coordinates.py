@@ -2,8 +2,9 @@
 
 Where a body is, is a motor M. A Hamiltonian speaks of it through a few functions of M: on groups
 that act affinely, x_world = x + s R x_body, the variables x, R and s; on conformal ones the matrix
-L of e_k ↦ M e_k M~, in which points are quotients; and the components of M themselves. Points of the body are variables too. Each variable knows what it is in M and its
-derivative along M exp(εE_i), from which every forque follows: F_b,i = Σ (∂H/∂q) δ_i q.
+L of e_k ↦ M e_k M~, in which points are quotients; and the components of M themselves. Points of
+the body are variables too. Each variable knows what it is in M and its derivative along
+M exp(εE_i), from which every forque follows: F_b,i = Σ (∂H/∂q) δ_i q.
 """
 
 from __future__ import annotations
