@@ -169,6 +169,12 @@ def test_a_mistake_is_named_with_file_and_key(old: str, new: str, message: str) 
             "",
             "SO3 is not closed: the bracket of a and b has parts along e12, which no generator",
         ),
+        (
+            'blades = ["s", "e23", "e31", "e12"]',
+            'blades = ["s", "e12"]',
+            "Rotor does not hold the group: .* need e13, e23 as well",
+        ),
+        ("unit = true", "unit = false", "SO3: Rotor must be a type of unit versors"),
     ],
 )
 def test_a_wrong_group_is_named(old: str, new: str, message: str) -> None:

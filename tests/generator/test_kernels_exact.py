@@ -142,6 +142,11 @@ class Library:
             "conjugate": lambda a: self.involute(o.reverse(a)),
             "project": lambda a, b: o.gp(o.inner(a, b), o.reverse(b)),
             "norm_squared": lambda a: o.grade(o.gp(a, o.reverse(a)), 0),
+            "exp": self.null_exponential,
+            "cayley": o.cayley,
+            "unit_defect": lambda m: added(o.gp(m, o.reverse(m)), {(): Fraction(-1)}),
+            "unit_defect_change": lambda m, x: added(o.gp(m, o.reverse(x)), o.gp(x, o.reverse(m))),
+            "unit_correction": lambda m, d: scaled(Fraction(-1, 2), o.gp(d, m)),
             "sandwich": self.sandwich,
             "ad": self.bracket,
             "coadjoint": lambda w, mu: self.bracket(mu, w),
@@ -189,6 +194,11 @@ class Library:
         )
         assert result.value(found) == value, f"{kernel['name']} {kernel['operands']}: not closed"
         return found
+
+    def null_exponential(self, b: Value) -> Value:
+        """exp b = 1 + b, the only exponential that is polynomial."""
+        assert not self.oracle.gp(b, b)
+        return added({(): Fraction(1)}, b)
 
     def bracket(self, a: Value, b: Value) -> Value:
         """a b − b a."""
@@ -288,7 +298,7 @@ class Library:
         """Arguments that determine a kernel, and some that guard its degree."""
         operands = self.operands(kernel)
         dice = random.Random(str(kernel))
-        if kernel["name"] == "norm_squared":
+        if kernel["name"] in ("norm_squared", "unit_defect"):
             (element,) = operands
             basis = element.basis()
             sums: list[Point] = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 
@@ -62,12 +63,13 @@ def test_the_same_text_changes_nothing_the_second_time(tmp_path: Path) -> None:
     assert stale.read_text(encoding="utf-8") == ""
 
 
-def test_only_the_listed_products_are_written(tmp_path: Path) -> None:
-    library(tmp_path, products=("reverse",))
+def test_only_the_listed_products_and_those_of_groups_are_written(tmp_path: Path) -> None:
+    library(tmp_path, products=("outer",))
     kernels = tmp_path / "include" / "hamotor" / "foo" / "kernels.hpp"
     text = kernels.read_text(encoding="utf-8")
-    assert " reverse(" in text
-    assert " gp(" not in text
+    written = set(re.findall(r"^/// (\w+): .* -> ", text, re.MULTILINE))
+    defects = {"unit_defect", "unit_defect_change", "unit_correction"}
+    assert written == {"outer", "gp", "reverse"} | defects
 
 
 def test_a_folder_with_anything_else_in_it_is_refused_untouched(tmp_path: Path) -> None:

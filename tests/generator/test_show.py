@@ -62,7 +62,7 @@ def test_chains_of_factors_are_made_as_well() -> None:
 
 def test_group_functions_are_found_by_the_names_of_rates_and_momenta() -> None:
     both = show("pga3", "ad", ["rate", "rate"])
-    assert both.count("/// ad: ") == 2
+    assert both.count("/// ad: ") == 3
     one = show("pga3", "ad", ["so3::Rate", "so3::Rate"])
     assert one in both
     assert one.count("/// ad: ") == 1

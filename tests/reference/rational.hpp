@@ -39,6 +39,9 @@ class Rational {
     return reduced(Wide(a.p_) * b.q_, Wide(a.q_) * b.p_);
   }
   friend constexpr Rational operator-(const Rational& a) { return reduced(-Wide(a.p_), a.q_); }
+  friend constexpr Rational fma(const Rational& a, const Rational& b, const Rational& c) {
+    return a * b + c;
+  }
   friend constexpr bool operator==(const Rational&, const Rational&) = default;
   friend constexpr std::strong_ordering operator<=>(const Rational& a, const Rational& b) {
     return Wide(a.p_) * b.q_ <=> Wide(b.p_) * a.q_;

@@ -930,4 +930,111 @@ template <class S>
           .e2i = q_e2i * inverse * root * root};
 }
 
+/// unit_defect: Motor -> MotorDefect
+/// m ~m − 1, how far m is from the group.
+/// Rounded once, as if computed in twice the precision.
+/// Cost: 0 mul, 0 add, 1 compensated_dot.
+template <class S>
+[[nodiscard]] constexpr MotorDefect<S> unit_defect(const Motor<S>& m) noexcept {
+  return {.s = scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e12, m.e12)};
+}
+
+/// unit_defect_change: Motor Motor -> MotorDefect
+/// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
+/// Cost: 3 mul, 1 add (1 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr MotorDefect<S> unit_defect_change(
+    const Motor<S>& m, const Motor<S>& low) noexcept {
+  return {.s = S(2) * dot(low.s, m.s, low.e12, m.e12)};
+}
+
+/// unit_correction: Motor MotorDefect -> Motor
+/// −½ d m: what to add to m, whose defect is d, to be on the group but for d².
+/// Cost: 5 mul, 0 add.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> unit_correction(const Motor<S>& m,
+                                                                const MotorDefect<S>& d) noexcept {
+  const S half_s = S(-0.5) * d.s;
+  return {.s = half_s * m.s, .e12 = half_s * m.e12, .e1i = half_s * m.e1i, .e2i = half_s * m.e2i};
+}
+
+/// unit_defect: Similarity -> SimilarityDefect
+/// m ~m − 1, how far m is from the group.
+/// Rounded once, as if computed in twice the precision.
+/// Cost: 1 mul, 0 add, 2 compensated_dot.
+template <class S>
+[[nodiscard]] constexpr SimilarityDefect<S> unit_defect(const Similarity<S>& m) noexcept {
+  return {.s = scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i,
+                                       m.e012i),
+          .e012i = S(2) * scalar::compensated_dot(m.e012i, m.s, -m.e0i, m.e12)};
+}
+
+/// unit_defect_change: Similarity Similarity -> SimilarityDefect
+/// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
+/// Cost: 10 mul, 6 add (4 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr SimilarityDefect<S> unit_defect_change(
+    const Similarity<S>& m, const Similarity<S>& low) noexcept {
+  return {.s = S(2) * dot(low.s, m.s, low.e12, m.e12, -low.e0i, m.e0i, -low.e012i, m.e012i),
+          .e012i = S(2) * dot(low.e012i, m.s, -low.e0i, m.e12, -low.e12, m.e0i, low.s, m.e012i)};
+}
+
+/// unit_correction: Similarity SimilarityDefect -> Similarity
+/// −½ d m: what to add to m, whose defect is d, to be on the group but for d².
+/// Cost: 14 mul, 6 add (6 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr Similarity<S> unit_correction(
+    const Similarity<S>& m, const SimilarityDefect<S>& d) noexcept {
+  const S half_s = S(-0.5) * d.s;
+  const S half_e012i = S(-0.5) * d.e012i;
+  return {.s = dot(half_s, m.s, -half_e012i, m.e012i),
+          .e12 = dot(half_s, m.e12, half_e012i, m.e0i),
+          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i),
+          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i),
+          .e0i = dot(half_s, m.e0i, -half_e012i, m.e12),
+          .e012i = dot(half_s, m.e012i, half_e012i, m.s)};
+}
+
+/// unit_defect: Versor -> VersorDefect
+/// m ~m − 1, how far m is from the group.
+/// Rounded once, as if computed in twice the precision.
+/// Cost: 3 mul, 0 add, 2 compensated_dot.
+template <class S>
+[[nodiscard]] constexpr VersorDefect<S> unit_defect(const Versor<S>& m) noexcept {
+  return {.s = scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e12, m.e12, S(2) * m.e01, m.e1i,
+                                       S(2) * m.e02, m.e2i, -m.e0i, m.e0i, -m.e012i, m.e012i),
+          .e012i = S(2) * scalar::compensated_dot(m.e012i, m.s, -m.e0i, m.e12, m.e02, m.e1i, -m.e01,
+                                                  m.e2i)};
+}
+
+/// unit_defect_change: Versor Versor -> VersorDefect
+/// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
+/// Cost: 18 mul, 14 add (12 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr VersorDefect<S> unit_defect_change(
+    const Versor<S>& m, const Versor<S>& low) noexcept {
+  return {.s = S(2) * dot(low.s, m.s, low.e12, m.e12, low.e01, m.e1i, low.e02, m.e2i, -low.e0i,
+                          m.e0i, -low.e012i, m.e012i, low.e1i, m.e01, low.e2i, m.e02),
+          .e012i = S(2) * dot(low.e012i, m.s, -low.e0i, m.e12, low.e02, m.e1i, -low.e01, m.e2i,
+                              -low.e12, m.e0i, low.s, m.e012i, -low.e2i, m.e01, low.e1i, m.e02)};
+}
+
+/// unit_correction: Versor VersorDefect -> Versor
+/// −½ d m: what to add to m, whose defect is d, to be on the group but for d².
+/// Cost: 18 mul, 8 add (8 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr Versor<S> unit_correction(
+    const Versor<S>& m, const VersorDefect<S>& d) noexcept {
+  const S half_s = S(-0.5) * d.s;
+  const S half_e012i = S(-0.5) * d.e012i;
+  return {.s = dot(half_s, m.s, -half_e012i, m.e012i),
+          .e12 = dot(half_s, m.e12, half_e012i, m.e0i),
+          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i),
+          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i),
+          .e0i = dot(half_s, m.e0i, -half_e012i, m.e12),
+          .e012i = dot(half_s, m.e012i, half_e012i, m.s),
+          .e01 = dot(half_s, m.e01, -half_e012i, m.e02),
+          .e02 = dot(half_s, m.e02, half_e012i, m.e01)};
+}
+
 }  // namespace hamotor::cga2

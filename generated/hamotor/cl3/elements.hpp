@@ -290,4 +290,47 @@ struct Odd {
   }
 };
 
+/// M ~M − 1 of a Rotor: zero on the group.
+template <class S>
+struct RotorDefect {
+  using Scalar = S;
+  S s;
+
+  /// Number of components.
+  static constexpr std::size_t size = 1;
+  /// Names of the components, in storage order.
+  static constexpr std::array<std::string_view, size> names{"s"};
+  /// The value with the given components, in storage order.
+  [[nodiscard]] static constexpr RotorDefect from(const std::array<S, size>& x) noexcept {
+    return {x[0]};
+  }
+  /// The components in storage order.
+  [[nodiscard]] constexpr std::array<S, size> components() const noexcept { return {s}; }
+  /// The same value in another scalar type.
+  template <class T>
+  [[nodiscard]] constexpr RotorDefect<T> cast() const {
+    return {static_cast<T>(s)};
+  }
+  [[nodiscard]] friend constexpr bool operator==(const RotorDefect&, const RotorDefect&) = default;
+  [[nodiscard]] friend constexpr RotorDefect operator+(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s + b.s};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s - b.s};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a) noexcept {
+    return {-a.s};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator*(const S& x, const RotorDefect& a) noexcept {
+    return {x * a.s};
+  }
+  /// x a + b, one multiply-add for each component.
+  [[nodiscard]] friend constexpr RotorDefect mul_add(const S& x, const RotorDefect& a,
+                                                     const RotorDefect& b) noexcept {
+    return {hamotor::mul_add(x, a.s, b.s)};
+  }
+};
+
 }  // namespace hamotor::cl3

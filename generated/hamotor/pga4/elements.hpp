@@ -748,4 +748,104 @@ struct Pseudoscalar {
   }
 };
 
+/// M ~M − 1 of a Motor: zero on the group.
+template <class S>
+struct MotorDefect {
+  using Scalar = S;
+  S s;
+  S e0123;
+  S e0124;
+  S e0134;
+  S e0234;
+  S e1234;
+
+  /// Number of components.
+  static constexpr std::size_t size = 6;
+  /// Names of the components, in storage order.
+  static constexpr std::array<std::string_view, size> names{"s",     "e0123", "e0124",
+                                                            "e0134", "e0234", "e1234"};
+  /// The value with the given components, in storage order.
+  [[nodiscard]] static constexpr MotorDefect from(const std::array<S, size>& x) noexcept {
+    return {x[0], x[1], x[2], x[3], x[4], x[5]};
+  }
+  /// The components in storage order.
+  [[nodiscard]] constexpr std::array<S, size> components() const noexcept {
+    return {s, e0123, e0124, e0134, e0234, e1234};
+  }
+  /// The same value in another scalar type.
+  template <class T>
+  [[nodiscard]] constexpr MotorDefect<T> cast() const {
+    return {static_cast<T>(s),     static_cast<T>(e0123), static_cast<T>(e0124),
+            static_cast<T>(e0134), static_cast<T>(e0234), static_cast<T>(e1234)};
+  }
+  [[nodiscard]] friend constexpr bool operator==(const MotorDefect&, const MotorDefect&) = default;
+  [[nodiscard]] friend constexpr MotorDefect operator+(const MotorDefect& a,
+                                                       const MotorDefect& b) noexcept {
+    return {a.s + b.s,         a.e0123 + b.e0123, a.e0124 + b.e0124,
+            a.e0134 + b.e0134, a.e0234 + b.e0234, a.e1234 + b.e1234};
+  }
+  [[nodiscard]] friend constexpr MotorDefect operator-(const MotorDefect& a,
+                                                       const MotorDefect& b) noexcept {
+    return {a.s - b.s,         a.e0123 - b.e0123, a.e0124 - b.e0124,
+            a.e0134 - b.e0134, a.e0234 - b.e0234, a.e1234 - b.e1234};
+  }
+  [[nodiscard]] friend constexpr MotorDefect operator-(const MotorDefect& a) noexcept {
+    return {-a.s, -a.e0123, -a.e0124, -a.e0134, -a.e0234, -a.e1234};
+  }
+  [[nodiscard]] friend constexpr MotorDefect operator*(const S& x, const MotorDefect& a) noexcept {
+    return {x * a.s, x * a.e0123, x * a.e0124, x * a.e0134, x * a.e0234, x * a.e1234};
+  }
+  /// x a + b, one multiply-add for each component.
+  [[nodiscard]] friend constexpr MotorDefect mul_add(const S& x, const MotorDefect& a,
+                                                     const MotorDefect& b) noexcept {
+    return {hamotor::mul_add(x, a.s, b.s),         hamotor::mul_add(x, a.e0123, b.e0123),
+            hamotor::mul_add(x, a.e0124, b.e0124), hamotor::mul_add(x, a.e0134, b.e0134),
+            hamotor::mul_add(x, a.e0234, b.e0234), hamotor::mul_add(x, a.e1234, b.e1234)};
+  }
+};
+
+/// M ~M − 1 of a Rotor: zero on the group.
+template <class S>
+struct RotorDefect {
+  using Scalar = S;
+  S s;
+  S e1234;
+
+  /// Number of components.
+  static constexpr std::size_t size = 2;
+  /// Names of the components, in storage order.
+  static constexpr std::array<std::string_view, size> names{"s", "e1234"};
+  /// The value with the given components, in storage order.
+  [[nodiscard]] static constexpr RotorDefect from(const std::array<S, size>& x) noexcept {
+    return {x[0], x[1]};
+  }
+  /// The components in storage order.
+  [[nodiscard]] constexpr std::array<S, size> components() const noexcept { return {s, e1234}; }
+  /// The same value in another scalar type.
+  template <class T>
+  [[nodiscard]] constexpr RotorDefect<T> cast() const {
+    return {static_cast<T>(s), static_cast<T>(e1234)};
+  }
+  [[nodiscard]] friend constexpr bool operator==(const RotorDefect&, const RotorDefect&) = default;
+  [[nodiscard]] friend constexpr RotorDefect operator+(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s + b.s, a.e1234 + b.e1234};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s - b.s, a.e1234 - b.e1234};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a) noexcept {
+    return {-a.s, -a.e1234};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator*(const S& x, const RotorDefect& a) noexcept {
+    return {x * a.s, x * a.e1234};
+  }
+  /// x a + b, one multiply-add for each component.
+  [[nodiscard]] friend constexpr RotorDefect mul_add(const S& x, const RotorDefect& a,
+                                                     const RotorDefect& b) noexcept {
+    return {hamotor::mul_add(x, a.s, b.s), hamotor::mul_add(x, a.e1234, b.e1234)};
+  }
+};
+
 }  // namespace hamotor::pga4

@@ -382,4 +382,48 @@ struct Pseudoscalar {
   }
 };
 
+/// M ~M − 1 of a Rotor: zero on the group.
+template <class S>
+struct RotorDefect {
+  using Scalar = S;
+  S s;
+  S e0123;
+
+  /// Number of components.
+  static constexpr std::size_t size = 2;
+  /// Names of the components, in storage order.
+  static constexpr std::array<std::string_view, size> names{"s", "e0123"};
+  /// The value with the given components, in storage order.
+  [[nodiscard]] static constexpr RotorDefect from(const std::array<S, size>& x) noexcept {
+    return {x[0], x[1]};
+  }
+  /// The components in storage order.
+  [[nodiscard]] constexpr std::array<S, size> components() const noexcept { return {s, e0123}; }
+  /// The same value in another scalar type.
+  template <class T>
+  [[nodiscard]] constexpr RotorDefect<T> cast() const {
+    return {static_cast<T>(s), static_cast<T>(e0123)};
+  }
+  [[nodiscard]] friend constexpr bool operator==(const RotorDefect&, const RotorDefect&) = default;
+  [[nodiscard]] friend constexpr RotorDefect operator+(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s + b.s, a.e0123 + b.e0123};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a,
+                                                       const RotorDefect& b) noexcept {
+    return {a.s - b.s, a.e0123 - b.e0123};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator-(const RotorDefect& a) noexcept {
+    return {-a.s, -a.e0123};
+  }
+  [[nodiscard]] friend constexpr RotorDefect operator*(const S& x, const RotorDefect& a) noexcept {
+    return {x * a.s, x * a.e0123};
+  }
+  /// x a + b, one multiply-add for each component.
+  [[nodiscard]] friend constexpr RotorDefect mul_add(const S& x, const RotorDefect& a,
+                                                     const RotorDefect& b) noexcept {
+    return {hamotor::mul_add(x, a.s, b.s), hamotor::mul_add(x, a.e0123, b.e0123)};
+  }
+};
+
 }  // namespace hamotor::sta

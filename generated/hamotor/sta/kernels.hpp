@@ -669,4 +669,47 @@ template <class S>
           .e0123 = dot(factor, r.e0123, turn, r.s)};
 }
 
+/// unit_defect: Rotor -> RotorDefect
+/// m ~m − 1, how far m is from the group.
+/// Rounded once, as if computed in twice the precision.
+/// Cost: 1 mul, 0 add, 2 compensated_dot.
+template <class S>
+[[nodiscard]] constexpr RotorDefect<S> unit_defect(const Rotor<S>& r) noexcept {
+  return {
+      .s = scalar::compensated_dot(S(-1), S(1), r.s, r.s, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12,
+                                   -r.e10, r.e10, -r.e20, r.e20, -r.e30, r.e30, -r.e0123, r.e0123),
+      .e0123 =
+          S(2) * scalar::compensated_dot(r.e0123, r.s, r.e10, r.e23, r.e20, r.e31, r.e12, r.e30)};
+}
+
+/// unit_defect_change: Rotor Rotor -> RotorDefect
+/// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
+/// Cost: 18 mul, 14 add (12 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr RotorDefect<S> unit_defect_change(
+    const Rotor<S>& r, const Rotor<S>& low) noexcept {
+  return {.s = S(2) * dot(low.s, r.s, low.e23, r.e23, low.e31, r.e31, low.e12, r.e12, -low.e10,
+                          r.e10, -low.e20, r.e20, -low.e30, r.e30, -low.e0123, r.e0123),
+          .e0123 = S(2) * dot(low.e0123, r.s, low.e10, r.e23, low.e20, r.e31, low.e30, r.e12,
+                              low.e23, r.e10, low.e31, r.e20, low.e12, r.e30, low.s, r.e0123)};
+}
+
+/// unit_correction: Rotor RotorDefect -> Rotor
+/// −½ d m: what to add to m, whose defect is d, to be on the group but for d².
+/// Cost: 18 mul, 8 add (8 fused).
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> unit_correction(const Rotor<S>& r,
+                                                                const RotorDefect<S>& d) noexcept {
+  const S half_s = S(-0.5) * d.s;
+  const S half_e0123 = S(-0.5) * d.e0123;
+  return {.s = dot(half_s, r.s, -half_e0123, r.e0123),
+          .e23 = dot(half_s, r.e23, -half_e0123, r.e10),
+          .e31 = dot(half_s, r.e31, -half_e0123, r.e20),
+          .e12 = dot(half_s, r.e12, -half_e0123, r.e30),
+          .e10 = dot(half_s, r.e10, half_e0123, r.e23),
+          .e20 = dot(half_s, r.e20, half_e0123, r.e31),
+          .e30 = dot(half_s, r.e30, half_e0123, r.e12),
+          .e0123 = dot(half_s, r.e0123, half_e0123, r.s)};
+}
+
 }  // namespace hamotor::sta

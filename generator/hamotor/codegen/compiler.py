@@ -51,7 +51,7 @@ def compile_algebra(spec: AlgebraSpec) -> tuple[SourceFile, ...]:
     kernels = library(spec)
     folder = f"hamotor/{spec.name}"
     algebra_kernels = [k for k in kernels if not k.namespace]
-    basic = [e for e in spec.elements.values() if e.name != "Scalar"]
+    basic = [e for e in spec.elements.values() if e.name != "Scalar"] + _defects(kernels)
     files = [
         _elements_file(spec, folder, basic),
         _kernels_file(spec, folder, "kernels", "", algebra_kernels, [f"{folder}/elements.hpp"]),
@@ -73,6 +73,12 @@ def compile_algebra(spec: AlgebraSpec) -> tuple[SourceFile, ...]:
     )
     files.append(SourceFile(f"{folder}/kernels.json", _index(spec, kernels)))
     return tuple(files)
+
+
+def _defects(kernels: Sequence[Kernel]) -> list[Element]:
+    """The types of M ~M − 1, which no spec lists."""
+    results = [k.program.result for k in kernels if k.name == "unit_defect"]
+    return [element for element in results if element is not None]
 
 
 @cache
@@ -275,7 +281,7 @@ def _index(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
         "spec_sha256": spec.digest,
         "elements": [
             _element_index(spec.algebra, e)
-            for e in [*spec.elements.values()]
+            for e in [*spec.elements.values(), *_defects(kernels)]
             + [x for g in spec.groups for x in (g.rate, g.momentum)]
         ],
         "kernels": [

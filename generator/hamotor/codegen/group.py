@@ -56,13 +56,15 @@ def lie_group(
 ) -> LieGroup:
     """Derive a group from its generators and prove what it must satisfy.
 
-    Raises UsageError, beginning with `where`, if a generator is not a bivector, if the generators
-    are dependent or do not close under the bracket, or if the pairing is not invariant.
+    Raises UsageError, beginning with `where`, if a generator is not a bivector, if the element type
+    does not hold the group, if the generators are dependent or do not close under the bracket, or
+    if the pairing is not invariant.
     """
     namespace = name.lower()
     for generator in generators:
         if {grade(b) for b in generator.bivector} != {2}:
             raise UsageError(f"{where}: generator {generator.name} is not a bivector")
+    _require_holder(algebra, element, generators, where)
     rate = Element(
         "Rate",
         "w",
@@ -91,6 +93,28 @@ def lie_group(
     )
     _prove_invariance(algebra, rate, momentum, structure, where)
     return LieGroup(name, description, element, generators, rate, momentum, structure)
+
+
+def _require_holder(
+    algebra: Algebra, element: Element, generators: tuple[Generator, ...], where: str
+) -> None:
+    """Refuse an element type that does not hold every product of the group's elements."""
+    blades = set(element.blades)
+    if not element.unit or element.fixed or 0 not in blades:
+        raise UsageError(
+            f"{where}: {element.name} must be a type of unit versors that holds 1: unit = true, "
+            '"s" among its blades, nothing fixed'
+        )
+    needed = {
+        *(b for generator in generators for b in generator.bivector),
+        *(c for a in blades for b in blades for c in algebra.blade_product(a, b)),
+    }
+    if needed - blades:
+        names = ", ".join(algebra.blade_name(b) for b in sorted(needed - blades))
+        raise UsageError(
+            f"{where}: {element.name} does not hold the group: generators and products of its "
+            f"elements need {names} as well"
+        )
 
 
 def _wedge(algebra: Algebra, a: Mapping[Blade, Rational], b: Mapping[Blade, Rational]) -> Fraction:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import prod
 
-from hamotor.codegen import closedform, transcendental
+from hamotor.codegen import closedform, nullform, transcendental
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
@@ -26,6 +26,7 @@ from hamotor.codegen.kernel import (
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
 from hamotor.codegen.program import Call, Parameter
 from hamotor.codegen.spec import AlgebraSpec, Request
+from hamotor.codegen.unit import unit_kernels
 from hamotor.errors import UsageError
 
 MAXIMUM_TERMS = 200_000
@@ -61,10 +62,22 @@ def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multi
 
 def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
     """Every kernel of a spec, in the order of its requests and then of its groups."""
-    kernels = [request_kernel(spec, request) for request in spec.requests]
+    kernels = [request_kernel(spec, request) for request in stepping_requests(spec)]
+    for element in {group.element.name: group.element for group in spec.groups}.values():
+        kernels += unit_kernels(spec.algebra, element)
     for group in spec.groups:
         kernels += group_kernels(spec, group)
     return tuple(kernels)
+
+
+def stepping_requests(spec: AlgebraSpec) -> tuple[Request, ...]:
+    """The spec's requests, and the product and the reverse of every type that holds a group."""
+    asked = dict.fromkeys(spec.requests)
+    for group in spec.groups:
+        name = group.element.name
+        asked.setdefault(Request("gp", (name, name), name))
+        asked.setdefault(Request("reverse", (name,), None))
+    return tuple(asked)
 
 
 def smallest_element(spec: AlgebraSpec, value: Mapping[Blade, object], where: str) -> Element:
@@ -367,6 +380,10 @@ def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedFo
         "cayley": closedform.cayley_kernel,
         "cayley_inverse": closedform.cayley_inverse_kernel,
     }
+    if nullform.applies(algebra, operand):
+        return lambda _algebra, operand, result, namespace, _where: nullform.null_kernel(
+            operation, operand, result, namespace
+        )
     forms = simple if _simple(algebra, operand) else general
     return forms[operation]
 

@@ -271,6 +271,11 @@ def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomi
             total = _expand(c, known)
             add_scaled(total, times(_expand(a, known), _expand(b, known)), 1)
             return total
+        case Call("compensated_dot", arguments):
+            total = {}
+            for a, b in zip(arguments[::2], arguments[1::2], strict=True):
+                add_scaled(total, times(_expand(a, known), _expand(b, known)), 1)
+            return total
         case _:
             raise ValueError(f"not a polynomial: {expression}")
 

@@ -34,7 +34,7 @@ def show(algebra: str, product: str, operands: Sequence[str]) -> str:
     Raises UsageError for an unknown algebra, product, element or combination.
     """
     spec, listed = _read(bundled_path(algebra))
-    known = list(dict.fromkeys([*OPERATIONS, *(k.name for k in listed if k.namespace)]))
+    known = list(dict.fromkeys([*OPERATIONS, *(_operation(k) for k in listed)]))
     if product not in known:
         raise UsageError(
             f'{algebra}: unknown product "{product}"; there are {", ".join(known)}.'
@@ -44,7 +44,7 @@ def show(algebra: str, product: str, operands: Sequence[str]) -> str:
     wanted, power, result = _split(operands, where)
     name = product if power is None else f"{product}_{power}"
     named = [k for k in listed if k.name == name or (not wanted and _operation(k) == product)]
-    types = _types(spec)
+    types = _types(spec, listed)
     for word in [*wanted, *([result] if result else [])]:
         _require(word, types, where)
     found = [
@@ -120,9 +120,9 @@ def _operation(kernel: Kernel) -> str:
     return "grade" if kernel.name.startswith("grade_") else kernel.name
 
 
-def _types(spec: AlgebraSpec) -> list[Element]:
-    groups = [e for group in spec.groups for e in (group.rate, group.momentum)]
-    return [*spec.elements.values(), *groups]
+def _types(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> list[Element]:
+    used = (e for kernel in kernels for e in kernel.operands)
+    return list({e.cpp_name: e for e in [*spec.elements.values(), *used]}.values())
 
 
 def _is(word: str, element: Element) -> bool:

@@ -19,6 +19,8 @@ struct Rotor;
 template <class S>
 struct Bivector;
 template <class S>
+struct IdealLine;
+template <class S>
 struct Point;
 template <class S>
 struct Origin;
@@ -62,17 +64,6 @@ struct RotorIncrement {
   std::array<S, R> sines;
 };
 
-/// M M~ − 1: the scalar's part and the pseudoscalar's.
-///
-/// `unit_defect` takes sums in twice the working precision.  The rounding of |M|² is not
-/// independent of the digits that a compensated sum keeps beside M; a projection by it alone turns
-/// spatial momenta a little the same way in every step, by 1e-14 in a million.
-template <class S>
-struct UnitDefect {
-  S scalar;
-  S pseudoscalar;
-};
-
 /// Geometry of the space on which G acts; specialised for each group.
 template <class G>
 struct Space;
@@ -101,15 +92,7 @@ struct Space<pga3::SE3> {
   template <class S>
   [[nodiscard]] static constexpr pga3::Motor<S> translation_change(
       const pga3::Motor<S>& m, const std::array<S, 3>& d) noexcept {
-    const std::array<S, 3> half{S(0.5) * d[0], S(0.5) * d[1], S(0.5) * d[2]};
-    return {S(0),
-            S(0),
-            S(0),
-            S(0),
-            mul_add(-m.e12, half[1], mul_add(m.e31, half[2], -m.s * half[0])),
-            mul_add(m.e12, half[0], mul_add(-m.e23, half[2], -m.s * half[1])),
-            mul_add(-m.e31, half[0], mul_add(m.e23, half[1], -m.s * half[2])),
-            mul_add(-m.e12, half[2], mul_add(-m.e31, half[1], -m.e23 * half[0]))};
+    return gp(m, pga3::IdealLine<S>{S(-0.5) * d[0], S(-0.5) * d[1], S(-0.5) * d[2]});
   }
 
   /// M q − M.
@@ -117,42 +100,6 @@ struct Space<pga3::SE3> {
   [[nodiscard]] static constexpr pga3::Motor<S> rotation_change(
       const pga3::Motor<S>& m, const RotorIncrement<S, 3>& q) noexcept {
     return gp(m, pga3::Rotor<S>{q.cosine_less_one, -q.sines[0], -q.sines[1], -q.sines[2]});
-  }
-
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Motor<S>& m) noexcept {
-    return {
-        scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12),
-        S(2) * scalar::compensated_dot(m.e0123, m.s, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12)};
-  }
-
-  /// Of M + low, to first order in low.
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Motor<S>& m,
-                                                           const pga3::Motor<S>& low) noexcept {
-    const auto defect = unit_defect(m);
-    return {mul_add(S(2), dot(m.s, low.s, m.e23, low.e23, m.e31, low.e31, m.e12, low.e12),
-                    defect.scalar),
-            mul_add(S(2),
-                    dot(m.e0123, low.s, low.e0123, m.s, -m.e01, low.e23, -low.e01, m.e23, -m.e02,
-                        low.e31, -low.e02, m.e31, -m.e03, low.e12, -low.e03, m.e12),
-                    defect.pseudoscalar)};
-  }
-
-  /// −½ (M M~ − 1) M: what brings M back to the group, but for the square of the defect.
-  template <class S>
-  [[nodiscard]] static constexpr pga3::Motor<S> unit_correction(
-      const pga3::Motor<S>& m, const UnitDefect<S>& defect) noexcept {
-    const S a = S(-0.5) * defect.scalar;
-    const S b = S(-0.5) * defect.pseudoscalar;
-    return {a * m.s,
-            a * m.e23,
-            a * m.e31,
-            a * m.e12,
-            mul_add(-b, m.e23, a * m.e01),
-            mul_add(-b, m.e31, a * m.e02),
-            mul_add(-b, m.e12, a * m.e03),
-            mul_add(b, m.s, a * m.e0123)};
   }
 };
 
@@ -182,29 +129,6 @@ struct Space<pga3::SO3> {
       const pga3::Rotor<S>& m, const RotorIncrement<S, 3>& q) noexcept {
     return gp(m, pga3::Rotor<S>{q.cosine_less_one, -q.sines[0], -q.sines[1], -q.sines[2]});
   }
-
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Rotor<S>& m) noexcept {
-    return {
-        scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12),
-        S(0)};
-  }
-
-  /// Of M + low, to first order in low.
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga3::Rotor<S>& m,
-                                                           const pga3::Rotor<S>& low) noexcept {
-    return {mul_add(S(2), dot(m.s, low.s, m.e23, low.e23, m.e31, low.e31, m.e12, low.e12),
-                    unit_defect(m).scalar),
-            S(0)};
-  }
-
-  /// −½ (M M~ − 1) M.
-  template <class S>
-  [[nodiscard]] static constexpr pga3::Rotor<S> unit_correction(
-      const pga3::Rotor<S>& m, const UnitDefect<S>& defect) noexcept {
-    return (S(-0.5) * defect.scalar) * m;
-  }
 };
 
 /// Rigid motions of the plane.
@@ -230,9 +154,7 @@ struct Space<pga2::SE2> {
   template <class S>
   [[nodiscard]] static constexpr pga2::Motor<S> translation_change(
       const pga2::Motor<S>& m, const std::array<S, 2>& d) noexcept {
-    const std::array<S, 2> half{S(0.5) * d[0], S(0.5) * d[1]};
-    return {S(0), S(0), mul_add(-m.e12, half[1], -m.s * half[0]),
-            mul_add(m.e12, half[0], -m.s * half[1])};
+    return gp(m, pga2::Direction<S>{S(0.5) * d[1], S(-0.5) * d[0]});
   }
 
   /// M q − M.
@@ -240,25 +162,6 @@ struct Space<pga2::SE2> {
   [[nodiscard]] static constexpr pga2::Motor<S> rotation_change(
       const pga2::Motor<S>& m, const RotorIncrement<S, 1>& q) noexcept {
     return gp(m, pga2::Motor<S>{q.cosine_less_one, -q.sines[0], S(0), S(0)});
-  }
-
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga2::Motor<S>& m) noexcept {
-    return {scalar::compensated_dot(S(-1), S(1), m.s, m.s, m.e12, m.e12), S(0)};
-  }
-
-  /// Of M + low, to first order in low.
-  template <class S>
-  [[nodiscard]] static constexpr UnitDefect<S> unit_defect(const pga2::Motor<S>& m,
-                                                           const pga2::Motor<S>& low) noexcept {
-    return {mul_add(S(2), dot(m.s, low.s, m.e12, low.e12), unit_defect(m).scalar), S(0)};
-  }
-
-  /// −½ (M M~ − 1) M.
-  template <class S>
-  [[nodiscard]] static constexpr pga2::Motor<S> unit_correction(
-      const pga2::Motor<S>& m, const UnitDefect<S>& defect) noexcept {
-    return (S(-0.5) * defect.scalar) * m;
   }
 };
 

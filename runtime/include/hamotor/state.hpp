@@ -48,6 +48,7 @@ concept LieGroup =
       { exp(w) } -> std::same_as<typename G::template Element<S>>;
       { gp(m, m) } -> std::same_as<typename G::template Element<S>>;
       { reverse(m) } -> std::same_as<typename G::template Element<S>>;
+      { unit_correction(m, unit_defect(m)) } -> std::same_as<typename G::template Element<S>>;
       { mul_add(x, w, w) } -> std::same_as<typename G::template Rate<S>>;
       { mul_add(x, mu, mu) } -> std::same_as<typename G::template Momentum<S>>;
     };

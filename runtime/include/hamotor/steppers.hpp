@@ -11,7 +11,6 @@
 #include <tuple>
 
 #include "hamotor/scalar.hpp"
-#include "hamotor/space.hpp"
 #include "hamotor/state.hpp"
 
 namespace hamotor {
@@ -38,9 +37,11 @@ constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
 }
 
 /// Largest absolute coefficient of M M~ − 1.
-template <class S>
-[[nodiscard]] constexpr S size(const UnitDefect<S>& defect) noexcept {
-  return scalar::max_abs(defect.scalar, defect.pseudoscalar);
+template <class Defect>
+[[nodiscard]] constexpr typename Defect::Scalar size(const Defect& defect) noexcept {
+  typename Defect::Scalar worst(0);
+  for (const auto& x : defect.components()) worst = scalar::max_abs(worst, x);
+  return worst;
 }
 
 template <class S>
@@ -93,9 +94,9 @@ class Rkmk4 {
           mul_add(S(2), two.force[i] + three.force[i], one.force[i] + four.force[i]);
       auto& motor = state.motors[i];
       motor = gp(motor, exp(x));
-      const auto defect = Space<G>::unit_defect(motor);
+      const auto defect = unit_defect(motor);
       worst = scalar::max_abs(worst, detail::size(defect));
-      motor = motor + Space<G>::unit_correction(motor, defect);
+      motor = motor + unit_correction(motor, defect);
       state.momenta[i] = mul_add(h / S(6), force, state.momenta[i]);
     }
     if constexpr (PoweredSystem<System>) {
@@ -227,16 +228,16 @@ class Splitting2 {
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = motors[i];
-      UnitDefect<S> defect;
+      decltype(unit_defect(motor)) defect;
       if constexpr (compensated) {
         auto& low = low_.motors[i];
         detail::add_compensated(motor, low, change[i]);
-        defect = Space<G>::unit_defect(motor, low);
-        detail::add_compensated(motor, low, Space<G>::unit_correction(motor, defect));
+        defect = unit_defect(motor) + unit_defect_change(motor, low);
+        detail::add_compensated(motor, low, unit_correction(motor, defect));
       } else {
         motor = motor + change[i];
-        defect = Space<G>::unit_defect(motor);
-        motor = motor + Space<G>::unit_correction(motor, defect);
+        defect = unit_defect(motor);
+        motor = motor + unit_correction(motor, defect);
       }
       worst = scalar::max_abs(worst, detail::size(defect));
     }
