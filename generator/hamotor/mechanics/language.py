@@ -41,11 +41,13 @@ MOST_BITS = 8_192
 """Of the numerator and of the denominator of a constant."""
 MOST_WRITTEN_OUT = 100_000
 """Nodes of an expression written out as a tree: nested cross products double it at every level."""
+MOST_FUNCTIONS_NESTED = 7
 CONSTANT_DIGITS = 60
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 
 _MOST_MAGNITUDE_BITS = 1_330
 _ADDED_AT_ONCE = 8
+_HYPERBOLIC_HARDNESS = 4
 _MOST_LISTED = 24
 _EXCERPT = 60
 _AXES = "xyzw"
@@ -516,7 +518,9 @@ def absolute(x: Scalar) -> Scalar:
     then speak of real and imaginary parts.
     """
     x = scalar(x)
-    return _checked(sympy.Abs(x)) if x.is_extended_real else sqrt(power(x, sympy.Integer(2)))
+    if _is_surely_real(x):
+        return _checked(sympy.Abs(x))
+    return sqrt(power(x, sympy.Integer(2)))
 
 
 FUNCTIONS: Mapping[str, Function] = {
@@ -627,8 +631,32 @@ def _rational_power(base: Scalar, exponent: Scalar) -> Scalar:
             # SymPy would factorise the coefficient.
             signed = rest if coefficient > 0 else -rest
             return _checked(_constant_power(abs(coefficient), exponent) * power(signed, exponent))
+        if isinstance(base, sympy.exp):
+            return exp(multiply(exponent, base.exp))
+        if base.is_Pow and base.exp.is_Rational:
+            return _power_of_power(base, exponent)
     _require_small_combined_exponent(base, exponent)
     return _checked(sympy.Pow(base, exponent))
+
+
+def _power_of_power(base: Scalar, exponent: Scalar) -> Scalar:
+    """(uⁿ)^q for rational n and fractional q, where it is real: uⁿ^q, or |u|ⁿ^q for even n.
+
+    SymPy would ask for arg(u).
+    """
+    combined = base.exp * exponent
+    if not base.exp.is_even or combined.is_even:
+        return power(base.base, combined)
+    if _is_surely_real(base.base):
+        return power(absolute(base.base), combined)
+    if _profile(base.base).nesting > 2:
+        raise UsageError("the root of a square, or the absolute value, of what may not be real")
+    return _checked(sympy.Pow(sympy.Pow(base.base, 2), combined / 2))
+
+
+def _is_surely_real(x: Scalar) -> bool:
+    """Whether SymPy knows quickly that the expression is real: no roots, logarithms, quotients."""
+    return _profile(x).real
 
 
 def _require_small_combined_exponent(base: Scalar, exponent: Scalar) -> None:
@@ -670,6 +698,9 @@ class _Profile:
     size: int
     constant: bool
     irrational: bool
+    real: bool = True
+    nonnegative: bool = False
+    nesting: int = 0
 
 
 @lru_cache(maxsize=1 << 15)
@@ -677,7 +708,7 @@ def _profile(expression: Any) -> _Profile:
     if expression.is_Rational:
         if _bits(expression) > MOST_BITS:
             raise UsageError("a constant becomes too large, too small or too long")
-        return _Profile(1, constant=True, irrational=False)
+        return _Profile(1, constant=True, irrational=False, nonnegative=bool(expression >= 0))
     if expression.is_Symbol:
         return _Profile(1, constant=False, irrational=False)
     if isinstance(expression, sympy.Float):
@@ -692,7 +723,36 @@ def _profile(expression: Any) -> _Profile:
         1 + sum(part.size for part in parts),
         constant,
         constant or any(part.irrational for part in parts),
+        *_real_and_nonnegative(expression, parts),
+        max((part.nesting for part in parts), default=0) + _hardness(expression),
     )
+
+
+def _hardness(expression: Any) -> int:
+    """How much a node adds to the depth to which SymPy has to ask for signs and zeros."""
+    if expression.is_Pow and expression.exp.is_Integer:
+        return 1 if expression.exp < 0 else 0
+    if isinstance(expression, (sympy.sinh, sympy.cosh, sympy.tanh)):
+        return _HYPERBOLIC_HARDNESS
+    return int(not (expression.is_Add or expression.is_Mul))
+
+
+def _real_and_nonnegative(expression: Any, parts: Sequence[_Profile]) -> tuple[bool, bool]:
+    """Whether an expression is seen to be real wherever its symbols are, and not negative."""
+    real = all(part.real for part in parts)
+    nonnegative = all(part.nonnegative for part in parts)
+    if expression.is_Add or expression.is_Mul:
+        return real, nonnegative
+    if isinstance(expression, (sympy.Abs, sympy.cosh, sympy.exp)):
+        return real, real
+    if expression.is_Pow:
+        base = parts[0]
+        if expression.exp.is_Integer:
+            return real, real and (base.nonnegative or bool(expression.exp.is_even))
+        return real and base.nonnegative, real and base.nonnegative
+    if isinstance(expression, sympy.log):
+        return nonnegative, False
+    return real and not isinstance(expression, (sympy.tan, sympy.asin, sympy.acos)), False
 
 
 def _checked(expression: Any) -> Scalar:
@@ -703,6 +763,10 @@ def _checked(expression: Any) -> Scalar:
         profile = _profile(expression)
     if profile.size > MOST_WRITTEN_OUT:
         raise UsageError(f"the expression, written out, has more than {MOST_WRITTEN_OUT} parts")
+    if profile.nesting > MOST_FUNCTIONS_NESTED:
+        raise UsageError(
+            f"functions, quotients and roots are nested more than {MOST_FUNCTIONS_NESTED} deep"
+        )
     return expression
 
 
@@ -827,7 +891,7 @@ class _Reader:
         self.text, self.where = text, where
         self._tokens = self._split()
         self._at = 0
-        self._nesting = 0
+        self._nesting = self._nodes = 0
         self._steps: list[_Step] = []
 
     def refuse(self, token: _Token, problem: str) -> NoReturn:
@@ -898,7 +962,8 @@ class _Reader:
 
     def _emit(self, step: _Step) -> None:
         self._steps.append(step)
-        if len(self._steps) > MOST_NODES:
+        self._nodes += len(step.signs) or 1
+        if self._nodes > MOST_NODES:
             self._refuse_nodes(step.token)
 
     def _enter(self, token: _Token) -> None:
