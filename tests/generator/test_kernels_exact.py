@@ -506,7 +506,9 @@ def test_no_kernel_is_without_a_definition(algebra: str) -> None:
         if kernel["polynomial"]:
             assert callable(library.definition(kernel))
         else:
-            assert kernel["name"] in known, "see test_ulp.py and test_closed_forms.py"
+            assert kernel["name"].removesuffix("_lean") in known, (
+                "see test_ulp.py and test_closed_forms.py"
+            )
 
 
 def test_a_wrong_kernel_is_caught(tmp_path: Path) -> None:

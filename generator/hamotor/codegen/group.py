@@ -35,6 +35,7 @@ class LieGroup:
 
     dual: the basis T^a of Λ^{n−2} with T^a ∧ E_b = δ I (theory: the wedge-dual basis).
     structure[a][b]: coordinates of [E_a, E_b].
+    lean: the functions that are wanted in their lean form, too.
     """
 
     name: str
@@ -44,6 +45,7 @@ class LieGroup:
     rate: Element
     momentum: Element
     structure: tuple[tuple[tuple[Rational, ...], ...], ...]
+    lean: tuple[str, ...] = ()
 
 
 def lie_group(

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import prod
 
-from hamotor.codegen import closedform, nullform, transcendental
+from hamotor.codegen import closedform, lean, nullform, transcendental
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
@@ -273,6 +273,8 @@ def _unary_kernel(
                 return transcendental.normalize_kernel(algebra, operand, result or operand, where)
             return closedform.normalize_kernel(algebra, operand, result or operand, where)
         case operation:
+            if operation == "normalize_lean":
+                result = result or operand
             if result is None:
                 raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
             build_form = _closed_form(algebra, operation, operand)
@@ -348,12 +350,13 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
     ]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
-    operations = (
+    operations = [
         ("exp", rate, element),
         ("log", element, rate),
         ("cayley", rate, element),
         ("cayley_inverse", element, rate),
-    )
+    ]
+    operations += [(f"{f}_lean", a, b) for f, a, b in operations if f in group.lean]
     for operation, operand, result in operations:
         build = _closed_form(algebra, operation, operand)
         kernels.append(build(algebra, operand, result, namespace, where))
@@ -368,6 +371,8 @@ def _simple(algebra: Algebra, operand: Element) -> bool:
 
 
 def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedForm:
+    if operation in lean.LEAN:
+        return lean.LEAN[operation]
     simple: dict[str, ClosedForm] = {
         "exp": transcendental.exp_kernel,
         "log": transcendental.log_kernel,

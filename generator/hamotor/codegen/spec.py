@@ -6,7 +6,7 @@ import hashlib
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -49,8 +49,15 @@ OPERATIONS = {
     "cayley": 1,
     "cayley_inverse": 1,
     "normalize": 1,
+    "exp_lean": 1,
+    "log_lean": 1,
+    "cayley_lean": 1,
+    "cayley_inverse_lean": 1,
+    "normalize_lean": 1,
 }
 """Operation → number of operands."""
+LEAN_FUNCTIONS = ("exp", "log", "cayley", "cayley_inverse")
+"""Functions of a group that may be asked for in their lean form, too."""
 CHAINS = ("gp", "outer", "regressive")
 """Associative operations, which take any number of operands from two on."""
 MAXIMUM_CHAIN = 6
@@ -309,7 +316,7 @@ class _Reader:
             table = self.table(entry, f"group {index}")
             name = self.name(table, "name", f"group {index}")
             where = f"group {name}"
-            self.known_keys(table, ("name", "description", "element", "generators"), where)
+            self.known_keys(table, ("name", "description", "element", "generators", "lean"), where)
             if any(group.name.lower() == name.lower() for group in groups):
                 raise self.fail(where, "there are two groups of that name")
             holder = self.text(table, "element", where)
@@ -342,16 +349,23 @@ class _Reader:
                 if len(set(names)) != len(names):
                     raise self.fail(where, f"two generators have the same {what}")
             description = self.text(table, "description", where)
-            groups.append(
-                lie_group(
-                    algebra,
-                    name,
-                    description,
-                    elements[holder],
-                    tuple(generators),
-                    f"{self.file}: {where}",
-                )
+            group = lie_group(
+                algebra,
+                name,
+                description,
+                elements[holder],
+                tuple(generators),
+                f"{self.file}: {where}",
             )
+            lean = self.array(table.get("lean", []), f"{where}.lean")
+            for function in lean:
+                if function not in LEAN_FUNCTIONS:
+                    raise self.fail(
+                        f"{where}.lean",
+                        f'unknown function "{function}"; allowed are {", ".join(LEAN_FUNCTIONS)}.'
+                        + suggest(str(function), LEAN_FUNCTIONS),
+                    )
+            groups.append(replace(group, lean=tuple(lean)))
         return tuple(groups)
 
     def requests(

@@ -102,7 +102,7 @@ def split_bivectors(algebra: Algebra, blades: Sequence[Blade]) -> Plane | None:
     return Plane(tuple(rotation), tuple(translation), tuple(pitch), along)
 
 
-def _required_split(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
+def required_split(algebra: Algebra, blades: Sequence[Blade], where: str) -> Plane:
     if others := [algebra.blade_name(b) for b in blades if grade(b) != 2]:
         raise UsageError(f"{where}: takes bivectors, which {', '.join(others)} are not")
     plane = split_bivectors(algebra, blades)
@@ -150,7 +150,7 @@ def _coefficients(
     }
 
 
-def _outputs(
+def outputs_for(
     values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
     """Read the components of the result off named blade coefficients."""
@@ -210,12 +210,14 @@ def _squared(values: Mapping[Blade, Expression]) -> list[Expression]:
     return [x for value in values.values() for x in (value, value)]
 
 
-def _pairs(plane: Plane, rotation: Mapping[Blade, Expression]) -> list[tuple[Expression, Blade]]:
+def pitch_pairs(
+    plane: Plane, rotation: Mapping[Blade, Expression]
+) -> list[tuple[Expression, Blade]]:
     """The factors of t = Σ rotation_u translation_v: signed rotation part and blade v."""
     return [(signed(sign, rotation[u]), v) for u, v, sign in plane.pitch]
 
 
-def _axis(plane: Plane, rotation: Mapping[Blade, Expression]) -> dict[Blade, Expression]:
+def axis_part(plane: Plane, rotation: Mapping[Blade, Expression]) -> dict[Blade, Expression]:
     """J of the rotation part: the translation blades along the axis."""
     return {v: signed(sign, rotation[u]) for v, (u, sign) in plane.along.items()}
 
@@ -250,7 +252,7 @@ def exp_kernel(
     """exp of a bivector or rate."""
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = _required_split(algebra, sorted(value), where)
+    plane = required_split(algebra, sorted(value), where)
     writer = Writer()
     b = _coefficients(writer, algebra, value, "b")
     w = _scaled(writer, {u: b[u] for u in plane.rotation}, "w", algebra)
@@ -269,20 +271,20 @@ def exp_kernel(
         sinc = writer.let("sinc", Select(moderate, Product(spin, w.inward), ONE))
     if plane.pitch:
         v = _scaled(writer, {v: b[v] for v in plane.translation}, "v", algebra)
-        terms = [x for axis, blade in _pairs(plane, w.values) for x in (axis, v.values[blade])]
+        terms = [x for axis, blade in pitch_pairs(plane, w.values) for x in (axis, v.values[blade])]
         product = writer.let("product", call("compensated_dot", *terms))
         square = Name("squares.hi")
         share = Select(square, Quotient(product, square), ZERO)
         along = writer.let("along", Product(Sum(sinc, Negative(cosine)), share))
-        axis = _axis(plane, w.values)
+        axis = axis_part(plane, w.values)
         for blade in plane.translation:
             moved = MultiplyAdd(along, axis[blade], Product(sinc, v.values[blade]))
             out[blade] = Product(v.outward, moved)
-        out[_quadrivector(plane)] = Product(v.outward, Product(spin, product))
+        out[quadrivector(plane)] = Product(v.outward, Product(spin, product))
     else:
         for blade in plane.translation:
             out[blade] = Product(sinc, b[blade])
-    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     bound = "Relative error at most 4 ulp of the result's norm"
     notes = [f"{bound}, for half angles up to 1/(8 ε)."]
     if plane.translation:
@@ -290,7 +292,7 @@ def exp_kernel(
     return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, tuple(notes))
 
 
-def _quadrivector(plane: Plane) -> Blade:
+def quadrivector(plane: Plane) -> Blade:
     u, v, _ = plane.pitch[0]
     return u | v
 
@@ -305,7 +307,7 @@ def log_kernel(
     """
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    plane = required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
     writer = Writer()
     m = _coefficients(writer, algebra, value, "m")
     cosine = m[0]
@@ -329,7 +331,7 @@ def log_kernel(
     ]
     if not plane.translation:
         out[first] = Select(length, out[first], half_turn)
-        program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+        program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
         return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
     straight = writer.let("straight", Quotient(ONE, cosine))
@@ -345,16 +347,16 @@ def log_kernel(
         notes.append(
             "−T, T ≠ 1 a translation, has no logarithm here; that of T, the same motion, is given."
         )
-        program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+        program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
         return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
-    quad = _quadrivector(plane)
+    quad = quadrivector(plane)
     q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
     root = writer.let(
         "root", Select(cosine, q.root_outward, Product(r.root_inward, q.root_outward))
     )
     inverse = writer.let("inverse", call("double_word_reciprocal", squares))
-    terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+    terms = [x for part, v in pitch_pairs(plane, r.values) for x in (part, q.values[v])]
     overlap = writer.let("overlap", call("compensated_dot_pair", *terms))
     share = writer.let(
         "share", call("compensated_dot_pair", *_double_word_product(overlap, inverse))
@@ -371,7 +373,7 @@ def log_kernel(
         exact = writer.let(f"moment_{name}", call("compensated_dot_pair", a, b, c, d))
         product = call("compensated_dot", *_double_word_product(exact, inverse))
         normal[blade] = writer.let(f"n_{name}", product)
-    axis = _axis(plane, r.values)
+    axis = axis_part(plane, r.values)
     double = _commutator(algebra, r.values, normal)
     # −T turns by π about the direction of its translation.
     squares = sum_of_products([(q.values[v], q.values[v]) for v in moved])
@@ -387,7 +389,7 @@ def log_kernel(
         across = Product(Product(part, root), root)
         moved_along = Product(Product(along, x), q.outward)
         out[blade] = Select(length, Sum(across, moved_along), Product(straight, m[blade]))
-    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     return Kernel("log", "log(M), M ~M = 1", program, None, namespace, None, tuple(notes))
 
 
@@ -400,7 +402,7 @@ def cayley_kernel(
     """
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = _required_split(algebra, sorted(value), where)
+    plane = required_split(algebra, sorted(value), where)
     writer = Writer()
     b = _coefficients(writer, algebra, value, "b")
     r = _scaled(writer, {u: b[u] for u in plane.rotation}, "r", algebra, ONE)
@@ -416,21 +418,21 @@ def cayley_kernel(
     if plane.pitch:
         q = _scaled(writer, {v: b[v] for v in plane.translation}, "q", algebra)
         root = writer.let("root", Product(r.inward, q.root_outward))
-        terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+        terms = [x for part, v in pitch_pairs(plane, r.values) for x in (part, q.values[v])]
         writer.let("product", call("compensated_dot_pair", *terms))
         writer.let("ratio", call("double_word_ratio", Name("product"), Name("total")))
         pitch = writer.let("pitch", Product(number(2), Name("ratio.hi")))
         pitch_low = writer.let("pitch_low", Product(number(2), Name("ratio.lo")))
-        axis = _axis(plane, r.values)
+        axis = axis_part(plane, r.values)
         for v, x in q.values.items():
             moved = MultiplyAdd(pitch_low, axis[v], MultiplyAdd(pitch, axis[v], x))
             out[v] = Product(Product(Product(twice, moved), root), root)
         screw = Product(Product(Product(factor, pitch), root), root)
-        out[_quadrivector(plane)] = screw
+        out[quadrivector(plane)] = screw
     else:
         for v in plane.translation:
             out[v] = Product(Product(factor, b[v]), r.inward)
-    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Relative error at most 4 ulp of the result's norm.",)
     return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace, None, notes)
 
@@ -445,7 +447,7 @@ def cayley_inverse_kernel(
     """
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    plane = required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
     writer = Writer()
     m = _coefficients(writer, algebra, value, "m")
     cosine = m[0]
@@ -462,10 +464,10 @@ def cayley_inverse_kernel(
     moved = {v: m[v] for v in plane.translation}
     root: Expression = Select(cosine, ONE, r.root_inward)
     if plane.pitch:
-        quad = _quadrivector(plane)
+        quad = quadrivector(plane)
         q = _scaled(writer, moved | {quad: m[quad]}, "q", algebra)
         root = Product(root, q.root_outward)
-        terms = [x for part, v in _pairs(plane, r.values) for x in (part, q.values[v])]
+        terms = [x for part, v in pitch_pairs(plane, r.values) for x in (part, q.values[v])]
         writer.let("product", call("compensated_dot_pair", *terms))
         writer.let("ratio", call("double_word_ratio", Name("product"), Name("squares")))
         share, share_low = (
@@ -474,7 +476,7 @@ def cayley_inverse_kernel(
         )
         terms = [cosine, share, cosine, share_low, q.values[quad], r.outward]
         along = writer.let("along", negative(call("compensated_dot", *terms)))
-        for v, x in _axis(plane, r.values).items():
+        for v, x in axis_part(plane, r.values).items():
             terms = [x, along, x, share, x, share_low, q.values[v], ONE]
             moved[v] = call("compensated_dot", *terms)
     if plane.translation:
@@ -482,7 +484,7 @@ def cayley_inverse_kernel(
         inward = writer.let("inward", Select(cosine, ONE, r.inward))
     for v, x in moved.items():
         out[v] = Product(Product(Product(Product(x, root), inverse), inward), root)
-    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "(M − 1)(M + 1)⁻¹, M ~M = 1"
     notes = (
         "Relative error at most 4 ulp of the result's norm.  Infinite or not a number at M = −1,",
@@ -495,7 +497,7 @@ def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where:
     """M (~M M)^(−1/2): the unit versor nearest to M, with ~M M = N² + 2 e I."""
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
-    plane = _required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    plane = required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
     writer = Writer()
     m = _coefficients(writer, algebra, value, "m")
     r = _scaled(writer, {u: m[u] for u in (0, *plane.rotation)}, "r", algebra)
@@ -503,20 +505,20 @@ def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where:
     inverse = writer.let("inverse", Quotient(ONE, call("sqrt", square)))
     out: dict[Blade, Expression] = {u: Product(inverse, x) for u, x in r.values.items()}
     if plane.translation:
-        quads = [_quadrivector(plane)] if plane.pitch else []
+        quads = [quadrivector(plane)] if plane.pitch else []
         q = _scaled(writer, {v: m[v] for v in (*plane.translation, *quads)}, "q", algebra)
         root = writer.let("root", Product(r.root_inward, q.root_outward))
         moved = q.values
         if plane.pitch:
-            quad = _quadrivector(plane)
-            products = [(negative(x), q.values[v]) for x, v in _pairs(plane, r.values)]
+            quad = quadrivector(plane)
+            products = [(negative(x), q.values[v]) for x, v in pitch_pairs(plane, r.values)]
             defect = sum_of_products([(r.values[0], q.values[quad]), *products])
             slip = negative(writer.let("slip", Quotient(defect, square)))
-            across = _axis(plane, r.values) | {quad: r.values[0]}
+            across = axis_part(plane, r.values) | {quad: r.values[0]}
             moved = {v: MultiplyAdd(slip, across[v], x) for v, x in moved.items()}
         for v, x in moved.items():
             out[v] = Product(Product(Product(x, inverse), root), root)
-    program = Program((parameter,), tuple(writer.bindings), _outputs(out, result), result)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "M (~M M)^(−1/2): the unit versor nearest to M"
     notes = ("Relative error at most 4 ulp of the result's norm, unless M has no rotor part.",)
     return Kernel("normalize", law, program, None, "", None, notes)

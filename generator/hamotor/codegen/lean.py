@@ -1,0 +1,200 @@
+"""Lean exp and log: the fewest operations, accurate where nothing is extreme.
+
+The closed forms of `transcendental.py` without what makes those accurate for every input: θ is one
+number, sums are plain, nothing is scaled.  Both are emitted under names of their own, `exp_lean`
+beside `exp`, and only where a spec asks; their notes say what the saving costs.  The lean Cayley
+maps and the lean normalisation are the general ones of `closedform.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+
+from hamotor.codegen import closedform
+from hamotor.codegen.algebra import Algebra, Blade, Rational, grade, magnitude
+from hamotor.codegen.element import Element
+from hamotor.codegen.kernel import Kernel, parameters_for, value_of
+from hamotor.codegen.program import (
+    Expression,
+    MultiplyAdd,
+    Name,
+    Negative,
+    Product,
+    Program,
+    Quotient,
+    Select,
+    Sum,
+    negative,
+    number,
+    sum_of_products,
+)
+from hamotor.codegen.transcendental import (
+    ONE,
+    ZERO,
+    Writer,
+    axis_part,
+    call,
+    outputs_for,
+    pitch_pairs,
+    quadrivector,
+    required_split,
+)
+from hamotor.errors import UsageError
+
+ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
+
+
+def _times(factor: Rational, x: Expression) -> Expression:
+    return x if factor == 1 else Product(number(factor), x)
+
+
+def _unsigned(x: Expression) -> Expression:
+    return x.x if isinstance(x, Negative) else x
+
+
+def _one_factor(sizes: set[Rational], where: str) -> Rational:
+    if len(sizes) != 1:
+        raise UsageError(f"{where}: lean forms need coordinates of one size for all blades")
+    return sizes.pop()
+
+
+def exp_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """exp of B = f (u + v), u its rotation part: sin θ / |u| serves every component."""
+    (parameter,) = parameters_for(operand)
+    value = value_of(parameter)
+    plane = required_split(algebra, sorted(value), where)
+    factor = _one_factor({magnitude(x) for p in value.values() for x in p.values()}, where)
+    b: dict[Blade, Expression] = {}
+    for blade, p in value.items():
+        (((name,), sign),) = p.items()
+        b[blade] = Name(name) if sign > 0 else Negative(Name(name))
+    u = {blade: b[blade] for blade in plane.rotation}
+    writer = Writer()
+    squares = writer.let("square", sum_of_products([(x, x) for x in map(_unsigned, u.values())]))
+    length = writer.let("length", call("sqrt", squares))
+    angle = writer.let("angle", _times(factor, length))
+    cosine = writer.let("cosine", call("cos", angle))
+    spin = writer.let("spin", Select(length, Quotient(call("sin", angle), length), number(factor)))
+    out: dict[Blade, Expression] = {0: cosine}
+    for blade, x in u.items():
+        out[blade] = Product(spin, x)
+    if plane.pitch:
+        terms: list[tuple[Expression, ...]] = [(x, b[v]) for x, v in pitch_pairs(plane, u)]
+        product = writer.let("product", sum_of_products(terms))
+        rest = (
+            Sum(spin, negative(cosine))
+            if factor == 1
+            else MultiplyAdd(number(-factor), cosine, spin)
+        )
+        share = Quotient(Product(rest, product), squares)
+        along = writer.let("along", Select(squares, share, ZERO))
+        turned = axis_part(plane, u)
+        for blade in plane.translation:
+            out[blade] = MultiplyAdd(along, turned[blade], Product(spin, b[blade]))
+        out[quadrivector(plane)] = Product(_times(factor, spin), product)
+    else:
+        for blade in plane.translation:
+            out[blade] = Product(spin, b[blade])
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    return Kernel(
+        "exp_lean", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, EXP_NOTES
+    )
+
+
+def log_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """Logarithm of a unit versor M = c + r + q + p by sin²θ = 1 − c²: a = θ / sin θ.
+
+    a r for the rotation part, a q + (a c − 1) p / sin²θ J(r) for the translation part.  For small
+    θ, a and the bracket are smooth functions of c, whose rounding does them no harm.
+    """
+    (parameter,) = parameters_for(operand)
+    value = value_of(parameter)
+    plane = required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    factor = _one_factor({magnitude(x) for f in result.reading for x in f.values()}, where)
+    m: dict[Blade, Expression] = {}
+    for blade, p in value.items():
+        (((name,), x),) = p.items()
+        if abs(x) != 1:
+            raise UsageError(f"{where}: {operand.name} must be stored in plain blades")
+        m[blade] = Name(name) if x > 0 else Negative(Name(name))
+    cosine = m[0]
+    writer = Writer()
+    square = writer.let("square", MultiplyAdd(negative(cosine), cosine, ONE))
+    sine = writer.let("sine", call("sqrt", square))
+    stretch = writer.let(
+        "stretch", Select(square, Quotient(call("atan2", sine, cosine), sine), ONE)
+    )
+    scaled = writer.let("scaled", _times(factor, stretch))
+    r = {blade: m[blade] for blade in plane.rotation}
+    out: dict[Blade, Expression] = {blade: Product(scaled, x) for blade, x in r.items()}
+    if plane.pitch:
+        slope = Quotient(m[quadrivector(plane)], square)
+        rest = MultiplyAdd(stretch, cosine, number(-1))
+        along = writer.let("along", Select(square, Product(_times(factor, rest), slope), ZERO))
+        turned = axis_part(plane, r)
+        for blade in plane.translation:
+            out[blade] = MultiplyAdd(along, turned[blade], Product(scaled, m[blade]))
+    else:
+        for blade in plane.translation:
+            out[blade] = Product(scaled, m[blade])
+    outputs: list[tuple[str, Expression]] = []
+    for component, functional in zip(result.components, result.reading, strict=True):
+        ((blade, x),) = functional.items()
+        outputs.append((component.name, out[blade] if x > 0 else negative(out[blade])))
+    program = Program((parameter,), tuple(writer.bindings), tuple(outputs), result)
+    return Kernel("log_lean", "log(M), M ~M = 1", program, None, namespace, None, LOG_NOTES)
+
+
+EXP_NOTES = (
+    "Lean: error at most 6 ulp of the result's norm, measured for half angles up to π; beyond, it",
+    "grows with the angle.  Squares of coordinates must not overflow.",
+)
+LOG_NOTES = (
+    "Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it",
+    "grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.",
+)
+CAYLEY_NOTES = (
+    "Lean: error at most 6 ulp of the result's norm, measured for half angles up to 3.14159.",
+    "Squares of coordinates must not overflow.",
+)
+CAYLEY_INVERSE_NOTES = (
+    "Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it",
+    "grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.",
+)
+NORMALIZE_NOTES = (
+    "Lean: error at most 4 ulp of the result's norm, measured.  Squares of coordinates must",
+    "neither overflow nor vanish.",
+)
+
+
+def _renamed(form: ClosedForm, name: str, notes: tuple[str, ...]) -> ClosedForm:
+    def build(
+        algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+    ) -> Kernel:
+        kernel = form(algebra, operand, result, namespace, where)
+        return replace(kernel, name=name, notes=notes)
+
+    return build
+
+
+def _normalize(
+    algebra: Algebra, operand: Element, result: Element, _namespace: str, where: str
+) -> Kernel:
+    return closedform.normalize_kernel(algebra, operand, result, where)
+
+
+LEAN: Mapping[str, ClosedForm] = {
+    "exp_lean": exp_kernel,
+    "log_lean": log_kernel,
+    "cayley_lean": _renamed(closedform.cayley_kernel, "cayley_lean", CAYLEY_NOTES),
+    "cayley_inverse_lean": _renamed(
+        closedform.cayley_inverse_kernel, "cayley_inverse_lean", CAYLEY_INVERSE_NOTES
+    ),
+    "normalize_lean": _renamed(_normalize, "normalize_lean", NORMALIZE_NOTES),
+}
+"""Operation → what builds its kernel."""
