@@ -25,7 +25,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
 from functools import lru_cache
-from typing import Any, Literal, NoReturn, TypeAlias
+from typing import Any, Literal, NamedTuple, NoReturn, TypeAlias
 
 import sympy
 
@@ -844,8 +844,7 @@ def read_vector(text: str, vocabulary: Vocabulary, where: str, dimension: int) -
 _Kind: TypeAlias = Literal["number", "name", "sign", "end"]
 
 
-@dataclass(frozen=True)
-class _Token:
+class _Token(NamedTuple):
     kind: _Kind
     text: str
     start: int
