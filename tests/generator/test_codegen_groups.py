@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from fractions import Fraction
 from itertools import product
 from random import Random
@@ -9,10 +10,19 @@ from random import Random
 import numpy
 import pytest
 
+from hamotor.codegen.algebra import Algebra
+from hamotor.codegen.casimir import Casimir, derivative, parse_polynomial, value
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.library import group_kernels
 from hamotor.codegen.program import Program
-from hamotor.codegen.spec import AlgebraSpec, bundled_algebras, bundled_path, read_algebra
+from hamotor.codegen.spec import (
+    AlgebraSpec,
+    bundled_algebras,
+    bundled_group,
+    bundled_path,
+    read_algebra,
+)
+from hamotor.errors import UsageError
 
 SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()}
 GROUPS = [(name, group) for name, spec in SPECS.items() for group in spec.groups]
@@ -133,6 +143,25 @@ def test_the_bracket_and_coadjoint_of_the_plane_are_the_classical_ones() -> None
         assert evaluate(coadjoint, a, mu) @ b == pytest.approx(mu @ bracket, abs=1e-14)
 
 
+def rational_versor(space: Algebra, group: LieGroup, dice: Random) -> dict[str, Fraction]:
+    """A product of three exact group elements, by the names that programs read."""
+    components = group.element.components
+    blades = {b: (c.name, s) for c in components for b, s in c.embedding.items()}
+    versor = {0: Fraction(1)}
+    for _ in range(3):  # products of 1 + b with b² = 0 or a rational rotation
+        generator = dice.choice(group.generators).bivector
+        square = space.multiply(generator, generator).get(0, 0)
+        t = Fraction(dice.randint(1, 4), dice.randint(5, 9))  # below 1: no boost is infinite
+        scale = 1 - t * t * square
+        factor = {0: Fraction(1 + t * t * square) / scale} | {
+            b: 2 * t * x / scale for b, x in generator.items()
+        }
+        versor = {b: Fraction(x) for b, x in space.multiply(versor, factor).items()}
+    symbol = group.element.symbol
+    m = {f"{symbol}.{c.name}": Fraction(0) for c in components}
+    return m | {f"{symbol}.{blades[b][0]}": x * blades[b][1] for b, x in versor.items()}
+
+
 @pytest.mark.parametrize(("algebra", "group"), GROUPS, ids=IDS)
 def test_pairing_is_invariant_under_the_group(algebra: str, group: LieGroup) -> None:
     """(Ad_star_inverse μ)(Ad w) = μ(w), exactly, for rational versors."""
@@ -140,22 +169,8 @@ def test_pairing_is_invariant_under_the_group(algebra: str, group: LieGroup) -> 
     kernels = {k.name: k.program for k in group_kernels(spec, group)}
     ad, star = kernels["Ad"], kernels["Ad_star_inverse"]
     dice = Random(6)
-    components = group.element.components
-    blades = {b: (c.name, s) for c in components for b, s in c.embedding.items()}
     for _ in range(5):
-        versor = {0: Fraction(1)}
-        for _ in range(3):  # products of 1 + b with b² = 0 or a rational rotation
-            generator = dice.choice(group.generators).bivector
-            square = spec.algebra.multiply(generator, generator).get(0, 0)
-            t = Fraction(dice.randint(1, 4), dice.randint(5, 9))  # below 1: no boost is infinite
-            scale = 1 - t * t * square
-            factor = {0: Fraction(1 + t * t * square) / scale} | {
-                b: 2 * t * x / scale for b, x in generator.items()
-            }
-            versor = {b: Fraction(x) for b, x in spec.algebra.multiply(versor, factor).items()}
-        symbol = group.element.symbol
-        m = {f"{symbol}.{c.name}": Fraction(0) for c in components}
-        m |= {f"{symbol}.{blades[b][0]}": x * blades[b][1] for b, x in versor.items()}
+        m = rational_versor(spec.algebra, group, dice)
         for _ in range(3):
             w = [Fraction(dice.randint(-9, 9)) for _ in group.generators]
             mu = [Fraction(dice.randint(-9, 9)) for _ in group.generators]
@@ -167,3 +182,122 @@ def test_pairing_is_invariant_under_the_group(algebra: str, group: LieGroup) -> 
             assert sum(x * y for x, y in zip(moved, seen, strict=True)) == sum(
                 x * y for x, y in zip(w, mu, strict=True)
             )
+
+
+def random_momentum(group: LieGroup, dice: Random) -> dict[str, Fraction]:
+    return {g.momentum: Fraction(dice.randint(1, 9), dice.randint(1, 5)) for g in group.generators}
+
+
+def rank(rows: list[list[Fraction]]) -> int:
+    rows = [list(row) for row in rows]
+    found = 0
+    for column in range(len(rows[0]) if rows else 0):
+        pivot = next((row for row in rows[found:] if row[column]), None)
+        if pivot is None:
+            continue
+        rows.remove(pivot)
+        rows.insert(found, pivot)
+        found += 1
+        for row in rows[found:]:
+            factor = row[column] / pivot[column]
+            row[:] = [x - factor * y for x, y in zip(row, pivot, strict=True)]
+    return found
+
+
+@pytest.mark.parametrize(("algebra", "group"), GROUPS, ids=IDS)
+def test_casimirs_are_constant_on_coadjoint_orbits(algebra: str, group: LieGroup) -> None:
+    """C(M μ ~M) = C(μ), exactly, for rational M: without the structure constants."""
+    spec = SPECS[algebra]
+    star = program(spec, group, "Ad_star_inverse")
+    dice = Random(7)
+    for _ in range(5):
+        m = rational_versor(spec.algebra, group, dice)
+        mu = random_momentum(group, dice)
+        moved = star.evaluate(m | {f"mu.{k}": x for k, x in mu.items()}, {"number": Fraction})
+        for casimir in group.casimirs:
+            assert value(casimir, mu) == value(casimir, moved) != 0
+
+
+@pytest.mark.parametrize(("algebra", "group"), GROUPS, ids=IDS)
+def test_every_group_lists_all_its_casimirs(algebra: str, group: LieGroup) -> None:
+    """As many independent ones as the Poisson tensor c_ab^k μ_k has null directions."""
+    assert algebra
+    mu = random_momentum(group, Random(8))
+    size = range(len(group.generators))
+    momenta = [mu[g.momentum] for g in group.generators]
+    poisson = [
+        [
+            sum((c * x for c, x in zip(group.structure[a][b], momenta, strict=True)), Fraction(0))
+            for b in size
+        ]
+        for a in size
+    ]
+    index = len(group.generators) - rank(poisson)
+    assert len(group.casimirs) == index
+    gradients = []
+    for casimir in group.casimirs:
+        d = value(Casimir("", "", casimir.denominator, {(): 1}), mu)
+        n = value(Casimir("", "", casimir.numerator, {(): 1}), mu)
+        row = []
+        for g in group.generators:
+            dn, dd = (
+                value(Casimir("", "", derivative(p, g.momentum), {(): 1}), mu)
+                for p in (casimir.numerator, casimir.denominator)
+            )
+            row.append(dn * d - n * dd)
+        gradients.append(row)
+    assert rank(gradients) == index
+
+
+def test_units_of_rates_and_momenta_follow_from_the_lengths() -> None:
+    group = bundled_group("cga3", "SO41")
+    rates = dict(zip([g.rate for g in group.generators], group.rate_units, strict=True))
+    momenta = dict(zip([g.momentum for g in group.generators], group.momentum_units, strict=True))
+    assert [rates[k] for k in ("w23", "v1", "d", "u1")] == ["rad/s", "m/s", "1/s", "1/(m s)"]
+    assert [momenta[k] for k in ("l23", "p1", "q", "k1")] == [
+        "kg m^2/s",
+        "kg m/s",
+        "kg m^2/s",
+        "kg m^3/s",
+    ]
+    assert {c.name: c.unit for c in group.casimirs} == {
+        "quadratic": "kg^2 m^4/s^2",
+        "quartic": "kg^4 m^8/s^4",
+    }
+    motor = bundled_group("pga3", "SE3")
+    names = [c.name for c in motor.element.components]
+    lengths = {n for n, u in zip(names, motor.element_units, strict=True) if u == "m"}
+    assert lengths == {"e01", "e02", "e03", "e0123"}
+
+
+def test_an_unknown_group_is_named_with_what_there_is() -> None:
+    with pytest.raises(UsageError, match=r'unknown group "SE".*SE3, SO3, T3.*Did you mean "SE3"'):
+        bundled_group("pga3", "SE")
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("l1 *", "ends too early"),
+        ("(l1", "a bracket is not closed"),
+        ("l1 l2", '"l2" is out of place'),
+        ("l3", '"l3" is not one of l1, l2'),
+        ("l1^99", '"99" is not a power from 1 to 8'),
+        ("l1 / l2", '"/" is not part of a polynomial'),
+        ("l1 + " * 500 + "l1", "longer than 2000 characters"),
+        ("(" * 1990, "has more than 20 brackets in one another"),
+        ("((l1+l2+1)^8)^8", "has more than 1000 terms"),
+    ],
+)
+def test_a_polynomial_that_cannot_be_read_says_why(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(message)):
+        parse_polynomial(text, ["l1", "l2"])
+
+
+def test_a_polynomial_reads_as_it_is_written() -> None:
+    assert parse_polynomial("-(l1 - 2*l2)^2 + 3", ["l1", "l2"]) == {
+        ("l1", "l1"): -1,
+        ("l1", "l2"): 4,
+        ("l2", "l2"): -4,
+        (): 3,
+    }

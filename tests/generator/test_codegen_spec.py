@@ -104,6 +104,16 @@ def test_the_examples_are_right_before_they_are_broken() -> None:
         ("diagonal = [1, 1]", "matrx = [[1]]", 'gram: unknown key "matrx".*Did you mean "matrix"'),
         ("{ diagonal = [1, 1] }", "{}", 'gram: needs exactly one of "diagonal" and "matrix"'),
         ("{ diagonal = [1, 1] }", "7", "gram: must be a table"),
+        (
+            "{ diagonal = [1, 1] }",
+            "{ diagonal = [1, 1] }\nlengths = { e1 = 1 }",
+            "lengths: e1·e1 = 1",
+        ),
+        (
+            "{ diagonal = [1, 1] }",
+            "{ diagonal = [1, 1] }\nlengths = { e1 = 0.5 }",
+            "must be an integer",
+        ),
         ("diagonal = [1, 1]", "matrix = [[1, 0]]", "gram.matrix: must be 2 × 2"),
         (
             "diagonal = [1, 1]",
@@ -173,6 +183,17 @@ def test_a_mistake_is_named_with_file_and_key(old: str, new: str, message: str) 
             'blades = ["s", "e23", "e31", "e12"]',
             'blades = ["s", "e12"]',
             "Rotor does not hold the group: .* need e13, e23 as well",
+        ),
+        *(
+            ("\n]\n", f'\n]\ncasimirs = [{{ name = "c", {text} }}]\n', message)
+            for text, message in (
+                ('numerator = "la"', "SO3: c is no Casimir: it does not Poisson-commute"),
+                ('numerator = "la^2 + lb^2 - lc^2"', "SO3: c is no Casimir"),
+                ('numerator = "1 + la^2 + lb^2 + lc^2"', "Casimir c: its terms have different"),
+                ('numerator = "ld"', 'SO3.casimirs.c.numerator: "ld" is not one of la, lb, lc'),
+                ('numerator = "0"', "SO3.casimirs.c.numerator: is zero"),
+                ('numerator = "la", denominator = "0"', "SO3.casimirs.c.denominator: is zero"),
+            )
         ),
         ("unit = true", "unit = false", "SO3: Rotor must be a type of unit versors"),
     ],

@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from hamotor.codegen import tree
-from hamotor.codegen.compiler import SourceFile, compile_algebra
-from hamotor.codegen.show import show, table
 from hamotor.codegen.spec import (
-    AlgebraSpec,
+    bundled_algebra,
     bundled_algebras,
-    bundled_path,
-    parse_algebra,
+    bundled_group,
     read_algebra,
 )
-from hamotor.codegen.standalone import standalone_files
-from hamotor.codegen.starter import starter_spec
-from hamotor.errors import UsageError
+
+if TYPE_CHECKING:
+    from hamotor.codegen.generation import generate, generate_library, source_files
+    from hamotor.codegen.printing import show, table
+    from hamotor.codegen.starter import starter_spec
+
+# Loaded on first use: a scene asks for groups and their laws, not for C++ text.
+_HOMES = {
+    "generate": "hamotor.codegen.generation",
+    "generate_library": "hamotor.codegen.generation",
+    "source_files": "hamotor.codegen.generation",
+    "show": "hamotor.codegen.printing",
+    "table": "hamotor.codegen.printing",
+    "starter_spec": "hamotor.codegen.starter",
+}
 
 __all__ = [
+    "bundled_algebra",
     "bundled_algebras",
+    "bundled_group",
     "generate",
     "generate_library",
     "read_algebra",
@@ -31,44 +40,11 @@ __all__ = [
 ]
 
 
-def source_files(specs: Sequence[AlgebraSpec]) -> tuple[SourceFile, ...]:
-    """Every generated file of these algebras, formatted."""
-    return tree.formatted([file for spec in specs for file in compile_algebra(spec)])
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'hamotor.codegen' has no attribute {name!r}")
+    from importlib import import_module
 
-
-def generate(
-    names: Sequence[str] = (), *, check: bool = False, out: Path | None = None
-) -> list[tree.Difference]:
-    """Write the libraries of bundled algebras (all by default), or only say what would change.
-
-    check: write nothing.  out: another folder than the committed `generated/`.
-    Returns how the folder differed: stale, missing or orphaned files; empty if it was up to date.
-    Raises UsageError for an unknown name or a spec with an error in it.
-    """
-    chosen = list(names) or bundled_algebras()
-    specs = [read_algebra(bundled_path(name)) for name in chosen]
-    files = source_files(specs)
-    folder = out or tree.GENERATED
-    owned = ["."] if not names and out is None else [f"hamotor/{name}" for name in chosen]
-    return (tree.differences if check else tree.write)(files, folder, owned)
-
-
-def generate_library(
-    spec_text: str, file: str, out: Path, *, check: bool = False
-) -> list[tree.Difference]:
-    """Write the library of any spec as a folder of its own: headers, CMake target, test.
-
-    file: what the spec is called in messages.  out: the folder; a folder that holds anything but an
-    earlier library of the same algebra is refused.  check: write nothing.
-    Returns how the folder differed.  Raises UsageError for a spec with an error in it.
-    """
-    spec = parse_algebra(spec_text, file)
-    if out.exists() and not out.is_dir():
-        raise UsageError(f"{out}: is not a folder")
-    marker = out / f"{spec.name}.toml"
-    if not marker.is_file() and any(not path.is_dir() for path in out.rglob("*")):
-        raise UsageError(
-            f"{out}: holds files that are not a library of {spec.name}; name an empty folder"
-        )
-    files = tree.formatted(standalone_files(spec, spec_text))
-    return (tree.differences if check else tree.write)(files, out, ["include/hamotor", "test"])
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value

@@ -66,11 +66,14 @@ class Algebra:
 
     basis: names of the basis vectors, in the order that orients the pseudoscalar.
     gram:  symmetric matrix of the inner products of the basis vectors, exact.
+    lengths: for each basis vector the power of length that a coefficient of it carries (e0 of PGA:
+        1, e∞ of CGA: 1 and its e0: −1); empty: none does.
     """
 
     name: str
     basis: tuple[str, ...]
     gram: tuple[tuple[Rational, ...], ...]
+    lengths: tuple[int, ...] = ()
     _products: dict[tuple[Blade, Blade], Multivector] = field(
         default_factory=dict, repr=False, compare=False
     )
@@ -111,6 +114,10 @@ class Algebra:
                 for j in live:
                     rows[i][j] -= column[i] * rows[pivot][j]
         return positive, negative, self.dimension - positive - negative
+
+    def length_power(self, blade: Blade) -> int:
+        """The power of length in the unit of the blade's coefficient."""
+        return sum(power for i, power in enumerate(self.lengths) if blade >> i & 1)
 
     def _contract_vector(self, vector: int, blade: Blade) -> Multivector:
         """Left contraction of a basis vector on a basis blade."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 from hamotor.codegen.algebra import (
@@ -15,6 +15,7 @@ from hamotor.codegen.algebra import (
     grade,
     simplest,
 )
+from hamotor.codegen.casimir import Casimir, unchanged, unit_of, unit_text
 from hamotor.codegen.element import Component, Element, inverse_matrix
 from hamotor.errors import UsageError
 
@@ -36,6 +37,8 @@ class LieGroup:
     dual: the basis T^a of Λ^{n−2} with T^a ∧ E_b = δ I (theory: the wedge-dual basis).
     structure[a][b]: coordinates of [E_a, E_b].
     lean: the functions that are wanted in their lean form, too.
+    casimirs: functions of the momentum that Poisson-commute with all of it.
+    *_units: SI units of the components of elements, rates and momenta.
     """
 
     name: str
@@ -45,6 +48,10 @@ class LieGroup:
     rate: Element
     momentum: Element
     structure: tuple[tuple[tuple[Rational, ...], ...], ...]
+    casimirs: tuple[Casimir, ...]
+    element_units: tuple[str, ...]
+    rate_units: tuple[str, ...]
+    momentum_units: tuple[str, ...]
     lean: tuple[str, ...] = ()
 
 
@@ -55,12 +62,13 @@ def lie_group(
     element: Element,
     generators: tuple[Generator, ...],
     where: str,
+    casimirs: tuple[Casimir, ...] = (),
 ) -> LieGroup:
     """Derive a group from its generators and prove what it must satisfy.
 
     Raises UsageError, beginning with `where`, if a generator is not a bivector, if the element type
-    does not hold the group, if the generators are dependent or do not close under the bracket, or
-    if the pairing is not invariant.
+    does not hold the group, if the generators are dependent or do not close under the bracket, if a
+    Casimir is none or has terms of different units, or if the pairing is not invariant.
     """
     namespace = name.lower()
     for generator in generators:
@@ -94,7 +102,58 @@ def lie_group(
         tuple(_bracket(algebra, rate, name, a, b, where) for b in generators) for a in generators
     )
     _prove_invariance(algebra, rate, momentum, structure, where)
-    return LieGroup(name, description, element, generators, rate, momentum, structure)
+    powers = [_length_power(algebra, g) for g in generators]
+    return LieGroup(
+        name,
+        description,
+        element,
+        generators,
+        rate,
+        momentum,
+        structure,
+        tuple(_proved_casimir(c, generators, structure, powers, where) for c in casimirs),
+        tuple(
+            unit_text(0, algebra.length_power(next(iter(c.embedding))), 0)
+            for c in element.components
+        ),
+        tuple(
+            "rad/s" if not power and _turns(algebra, g) else unit_text(0, power, -1)
+            for g, power in zip(generators, powers, strict=True)
+        ),
+        tuple(unit_text(1, 2 - power, -1) for power in powers),
+    )
+
+
+def _length_power(algebra: Algebra, generator: Generator) -> int:
+    """The power of length in a rate: of a screw, that of its rotation; its pitch is a number."""
+    return min((algebra.length_power(b) for b in generator.bivector), key=abs)
+
+
+def _turns(algebra: Algebra, generator: Generator) -> bool:
+    return algebra.multiply(generator.bivector, generator.bivector).get(0, 0) < 0
+
+
+def _proved_casimir(
+    casimir: Casimir,
+    generators: tuple[Generator, ...],
+    structure: tuple[tuple[tuple[Rational, ...], ...], ...],
+    powers: list[int],
+    where: str,
+) -> Casimir:
+    """The Casimir with its unit, after {C, μ_a} = 0 has been proved for every a."""
+    names = [g.momentum for g in generators]
+    if not unchanged(casimir, names, structure):
+        raise UsageError(
+            f"{where}: {casimir.name} is no Casimir: it does not Poisson-commute with every "
+            "momentum"
+        )
+    lengths = {name: 2 - power for name, power in zip(names, powers, strict=True)}
+    try:
+        above, below = (unit_of(p, lengths) for p in (casimir.numerator, casimir.denominator))
+    except ValueError as error:
+        raise UsageError(f"{where}: Casimir {casimir.name}: {error}") from error
+    degree = above[0] - below[0]
+    return replace(casimir, unit=unit_text(degree, above[1] - below[1], -degree))
 
 
 def _require_holder(

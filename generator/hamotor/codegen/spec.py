@@ -8,10 +8,12 @@ import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from hamotor.codegen.algebra import Algebra, Blade, Rational, simplest
+from hamotor.codegen.casimir import Casimir, parse_polynomial
 from hamotor.codegen.element import Component, Element, blade_component
 from hamotor.codegen.group import Generator, LieGroup, lie_group
 from hamotor.errors import UsageError, suggest
@@ -20,7 +22,7 @@ BUNDLED = Path(__file__).resolve().parents[2] / "algebras"
 MAXIMUM_DIMENSION = 8
 MAXIMUM_BYTES = 1 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
-KEYS = ("name", "description", "basis", "gram", "element", "kernels", "group")
+KEYS = ("name", "description", "basis", "gram", "lengths", "element", "kernels", "group")
 OPERATIONS = {
     "gp": 2,
     "outer": 2,
@@ -96,6 +98,17 @@ class AlgebraSpec:
         """The algebra's name."""
         return self.algebra.name
 
+    def group(self, name: str) -> LieGroup:
+        """Group by name; raises UsageError with what there is."""
+        found = next((group for group in self.groups if group.name == name), None)
+        if found is None:
+            known = [group.name for group in self.groups]
+            raise UsageError(
+                f'{self.file}: unknown group "{name}"; groups of {self.name} are '
+                f"{', '.join(known)}.{suggest(name, known)}"
+            )
+        return found
+
     def element(self, name: str, where: str) -> Element:
         """Element type by name; raises UsageError with what there is."""
         found = self.elements.get(name)
@@ -121,6 +134,23 @@ def bundled_path(name: str) -> Path:
             f'unknown algebra "{name}"; bundled are {", ".join(known)}.{suggest(name, known)}'
         )
     return BUNDLED / f"{name}.toml"
+
+
+@cache
+def bundled_algebra(name: str) -> AlgebraSpec:
+    """A bundled spec, read and proved once in a process; no kernel is made.
+
+    Raises UsageError where there is none of that name.
+    """
+    return read_algebra(bundled_path(name))
+
+
+def bundled_group(algebra: str, name: str) -> LieGroup:
+    """The group `name` of the bundled algebra; its element type is `.element`.
+
+    Raises UsageError, with what there is, for an unknown algebra or group.
+    """
+    return bundled_algebra(algebra).group(name)
 
 
 def read_algebra(path: Path) -> AlgebraSpec:
@@ -260,7 +290,27 @@ class _Reader:
                             f"not symmetric: {basis[i]}·{basis[j]} = {rows[i][j]} but "
                             f"{basis[j]}·{basis[i]} = {rows[j][i]}",
                         )
-        return Algebra(name, tuple(basis), tuple(tuple(row) for row in rows))
+        lengths = self.lengths(data, basis, rows)
+        return Algebra(name, tuple(basis), tuple(tuple(row) for row in rows), lengths)
+
+    def lengths(
+        self, data: Mapping[str, Any], basis: list[str], gram: list[list[Rational]]
+    ) -> tuple[int, ...]:
+        table = self.table(data.get("lengths", {}), "lengths")
+        self.known_keys(table, tuple(basis), "lengths")
+        for vector, power in table.items():
+            if isinstance(power, bool) or not isinstance(power, int) or abs(power) > 9:
+                raise self.fail("lengths", f'"{vector}" must be an integer from -9 to 9')
+        powers = tuple(table.get(vector, 0) for vector in basis)
+        for i, row in enumerate(gram):
+            for j, product in enumerate(row):
+                if product and powers[i] + powers[j]:
+                    raise self.fail(
+                        "lengths",
+                        f"{basis[i]}·{basis[j]} = {product} is a number, so that the powers of "
+                        "length of both must cancel",
+                    )
+        return powers
 
     def blade(self, algebra: Algebra, text: Any, where: str) -> tuple[Blade, int]:
         if not isinstance(text, str):
@@ -316,7 +366,9 @@ class _Reader:
             table = self.table(entry, f"group {index}")
             name = self.name(table, "name", f"group {index}")
             where = f"group {name}"
-            self.known_keys(table, ("name", "description", "element", "generators", "lean"), where)
+            self.known_keys(
+                table, ("name", "description", "element", "generators", "casimirs", "lean"), where
+            )
             if any(group.name.lower() == name.lower() for group in groups):
                 raise self.fail(where, "there are two groups of that name")
             holder = self.text(table, "element", where)
@@ -356,6 +408,7 @@ class _Reader:
                 elements[holder],
                 tuple(generators),
                 f"{self.file}: {where}",
+                self.casimirs(table, [g.momentum for g in generators], where),
             )
             lean = self.array(table.get("lean", []), f"{where}.lean")
             for function in lean:
@@ -367,6 +420,31 @@ class _Reader:
                     )
             groups.append(replace(group, lean=tuple(lean)))
         return tuple(groups)
+
+    def casimirs(
+        self, group: Mapping[str, Any], momenta: list[str], where: str
+    ) -> tuple[Casimir, ...]:
+        found: dict[str, Casimir] = {}
+        for item in self.array(group.get("casimirs", []), f"{where}.casimirs"):
+            table = self.table(item, f"{where}.casimirs")
+            keys = ("name", "formula", "numerator", "denominator")
+            self.known_keys(table, keys, f"{where}.casimirs")
+            name = self.name(table, "name", f"{where}.casimirs")
+            place = f"{where}.casimirs.{name}"
+            if name in found:
+                raise self.fail(place, "there are two Casimirs of that name")
+            parts = []
+            for key, default in (("numerator", None), ("denominator", "1")):
+                text = self.text(table, key, place, default)
+                try:
+                    parts.append(parse_polynomial(text, momenta))
+                except ValueError as error:
+                    raise self.fail(f"{place}.{key}", str(error)) from error
+                if not parts[-1]:
+                    raise self.fail(f"{place}.{key}", "is zero")
+            formula = self.text(table, "formula", place, name)
+            found[name] = Casimir(name, formula, parts[0], parts[1])
+        return tuple(found.values())
 
     def requests(
         self, data: Mapping[str, Any], elements: Mapping[str, Element]
