@@ -1,13 +1,15 @@
-# hamotor_add_algebra(NAME SIGNATURE P Q R [NULL_PAIRS N] [PRODUCTS PRODUCT...] [TEST])
+# hamotor_add_algebra(NAME SIGNATURE P Q R [NULL_PAIRS N] [KERNELS KERNEL...] [TEST])
 # hamotor_add_algebra(NAME SPEC FILE [TEST])
 #
 # Generates an algebra's kernels in the build tree when something that links them is built, and
 # again when the spec or the generator changes.  Gives the target hamotor::NAME; its headers are
 # hamotor/NAME/NAME.hpp and its parts, in the namespace hamotor::NAME.
 #
-# SIGNATURE  numbers of positive, negative and null basis vectors; PRODUCTS the operations wanted
-#            (gp, sandwich, ...; default: all); NULL_PAIRS as many pairs of a positive and a
-#            negative vector become null vectors with product -1
+# SIGNATURE  numbers of positive, negative and null basis vectors; NULL_PAIRS as many pairs of a
+#            positive and a negative vector become null vectors with product -1
+# KERNELS    what is wanted (default: all but dexp): operations (gp, sandwich, dexp, ...) for the
+#            operands that come with them, or requests as in a spec ("gp Even Vector -> Odd");
+#            element types are those that `hamotor new algebra --signature P,Q,R` prints
 # SPEC       a spec file (`hamotor new algebra` prints one); its name must be NAME
 # TEST       also builds NAME_kernels, which compares every kernel with products by table, and
 #            adds it to CTest
@@ -18,7 +20,7 @@
 include_guard(GLOBAL)
 
 function(hamotor_add_algebra name)
-  cmake_parse_arguments(PARSE_ARGV 1 arg "TEST" "NULL_PAIRS;SPEC" "SIGNATURE;PRODUCTS")
+  cmake_parse_arguments(PARSE_ARGV 1 arg "TEST" "NULL_PAIRS;SPEC" "SIGNATURE;KERNELS")
   set(here "hamotor_add_algebra(${name})")
   if(NOT name MATCHES "^[A-Za-z][A-Za-z0-9_]*$")
     message(FATAL_ERROR "${here}: the name must match [A-Za-z][A-Za-z0-9_]*")
@@ -28,7 +30,7 @@ function(hamotor_add_algebra name)
   endif()
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "${here}: unknown arguments: ${arg_UNPARSED_ARGUMENTS}; "
-                        "allowed are SIGNATURE, NULL_PAIRS, PRODUCTS, SPEC and TEST")
+                        "allowed are SIGNATURE, NULL_PAIRS, KERNELS, SPEC and TEST")
   endif()
   if(arg_KEYWORDS_MISSING_VALUES)
     message(FATAL_ERROR "${here}: no value for ${arg_KEYWORDS_MISSING_VALUES}")
@@ -38,8 +40,8 @@ function(hamotor_add_algebra name)
   endif()
 
   if(DEFINED arg_SPEC)
-    if(DEFINED arg_NULL_PAIRS OR DEFINED arg_PRODUCTS)
-      message(FATAL_ERROR "${here}: NULL_PAIRS and PRODUCTS go with SIGNATURE; "
+    if(DEFINED arg_NULL_PAIRS OR DEFINED arg_KERNELS)
+      message(FATAL_ERROR "${here}: NULL_PAIRS and KERNELS go with SIGNATURE; "
                           "a SPEC says these itself")
     endif()
     cmake_path(ABSOLUTE_PATH arg_SPEC BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE)
@@ -65,9 +67,9 @@ function(hamotor_add_algebra name)
     if(DEFINED arg_NULL_PAIRS)
       list(APPEND what --null-pairs "${arg_NULL_PAIRS}")
     endif()
-    if(DEFINED arg_PRODUCTS)
-      list(JOIN arg_PRODUCTS "," products)
-      list(APPEND what --products "${products}")
+    if(DEFINED arg_KERNELS)
+      list(JOIN arg_KERNELS "," kernels)
+      list(APPEND what --products "${kernels}")
     endif()
   endif()
 

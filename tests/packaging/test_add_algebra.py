@@ -80,7 +80,7 @@ APP = "add_executable(app main.cpp)\ntarget_link_libraries(app PRIVATE hamotor::
 
 
 def test_a_signature_becomes_a_target_with_a_test(tmp_path: Path) -> None:
-    call = "hamotor_add_algebra(foo SIGNATURE 2 2 1 PRODUCTS gp sandwich reverse TEST)"
+    call = 'hamotor_add_algebra(foo SIGNATURE 2 2 1 KERNELS gp dexp "sandwich Versor Vector" TEST)'
     project(tmp_path, f"{call}\n{APP.format(name='foo')}")
     main = MAIN.format(name="foo", numbers="1, 2, 3, 4, 5", product="gp(v, v).s")
     (tmp_path / "main.cpp").write_text(main, encoding="utf-8")
@@ -91,6 +91,9 @@ def test_a_signature_becomes_a_target_with_a_test(tmp_path: Path) -> None:
     assert run(build / "app") == "-28\n"
     assert "100% tests passed" in run("ctest", "--test-dir", build, "--no-tests=error")
     assert "no work to do" in run("cmake", "--build", build)
+    text = (build / "hamotor_algebras" / "foo" / "foo.toml").read_text(encoding="utf-8")
+    assert 'sandwich = ["Versor Vector"]' in text
+    assert 'kernels = ["dexp"]' in text
 
 
 def test_a_changed_spec_is_generated_again(tmp_path: Path) -> None:
@@ -113,7 +116,7 @@ def test_an_installed_hamotor_calls_the_generator_it_is_given(tmp_path: Path) ->
     prefix, own = tmp_path / "prefix", tmp_path / "own"
     run("cmake", "-G", "Ninja", "-DHAMOTOR_BUILD_TESTS=OFF", "-S", ROOT, "-B", own)
     run("cmake", "--install", own, "--prefix", prefix)
-    call = "hamotor_add_algebra(foo SIGNATURE 2 0 0 PRODUCTS gp)"
+    call = "hamotor_add_algebra(foo SIGNATURE 2 0 0 KERNELS gp)"
     user = tmp_path / "user"
     nowhere_else = "set(CMAKE_FIND_USE_SYSTEM_ENVIRONMENT_PATH OFF)\n"
     nowhere_else += "set(CMAKE_FIND_USE_CMAKE_SYSTEM_PATH OFF)"
@@ -143,9 +146,10 @@ def test_an_installed_hamotor_calls_the_generator_it_is_given(tmp_path: Path) ->
         ("2foo SIGNATURE 2 0 0", "the name must match"),
         ("foo SPEC nowhere.toml", "no such file"),
         ("bar SPEC line.toml", 'is the spec of "line"'),
-        ("line SPEC line.toml PRODUCTS gp", "go with SIGNATURE"),
+        ("line SPEC line.toml KERNELS gp", "go with SIGNATURE"),
         ("foo SIGNATURE 2 0 0 KERNEL gp", "SIGNATURE needs three whole numbers"),
         ("foo KERNEL gp", "unknown arguments: KERNEL;gp"),
+        ("foo SIGNATURE 2 0 0 KERNELS", "no value for KERNELS"),
     ],
 )
 def test_a_wrong_call_is_explained_when_it_is_configured(

@@ -77,7 +77,7 @@ class Square:
     omega: Polynomial
 
 
-def _square(
+def square_of(
     algebra: Algebra, writer: Writer, square: PolynomialMultivector, names: str, where: str
 ) -> Square:
     """Bind S, W and ω of a square; raises UsageError where it is not a number plus grade 4."""
@@ -179,7 +179,7 @@ def exp_kernel(
     (parameter,) = parameters_for(operand)
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
-    parts = _square(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    parts = square_of(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
     twisted = {
         blade: p
         for blade, p in poly.apply_bilinear(algebra.geometric, b, parts.quad).items()
@@ -244,7 +244,7 @@ def cayley_kernel(
     (parameter,) = parameters_for(operand)
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
-    parts = _square(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    parts = square_of(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
     one: Polynomial = {(): 1}
     s = polynomial_expression(parts.number)
     left = poly.added({0: one}, {0: parts.number}, -1)[0]
@@ -321,7 +321,7 @@ def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: s
     if len({g % 2 for g in operand.grades}) != 1:
         raise UsageError(f"{where}: {operand.name} must be even or odd")
     square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
-    parts = _square(algebra, writer, square, "q", where)
+    parts = square_of(algebra, writer, square, "q", where)
     norm = writer.let("norm2", polynomial_expression(parts.number))
     reversed_ = reversed_value(value)
     if not parts.quad:
@@ -365,7 +365,7 @@ def normalize_kernel(
         shifted = poly.added({0: {(): addend}}, {0: value[0]})[0]
         value[0] = writer.let_polynomial("shifted", shifted)
     square = poly.apply_bilinear(algebra.geometric, reversed_value(value), value)
-    parts = _square(algebra, writer, square, "q", where)
+    parts = square_of(algebra, writer, square, "q", where)
     norm = writer.let("norm2", polynomial_expression(parts.number))
     if parts.omega:
         omega = negative(polynomial_expression(parts.omega))

@@ -34,6 +34,7 @@ functions of the runtime are longer than their count."""
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
     "bivector_logarithm": "hamotor/bivector_logarithm.hpp",
+    **dict.fromkeys(cpp.RATE_JACOBIANS, "hamotor/rate_jacobian.hpp"),
 }
 """Functions that stand in a header of their own."""
 
@@ -209,7 +210,8 @@ def _kernels_file(
 ) -> SourceFile:
     template = "kernels.hpp.jinja"
     needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
-    includes = [*includes, *(RUNTIME_HEADERS[f] for f in sorted(needed) if f in RUNTIME_HEADERS)]
+    found = {RUNTIME_HEADERS[f]: None for f in sorted(needed) if f in RUNTIME_HEADERS}
+    includes = [*includes, *found]
     text = render(
         template,
         banner=_banner(spec, template, "Kernels: unrolled, sparse, for any scalar type S."),

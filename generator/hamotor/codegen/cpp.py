@@ -19,7 +19,18 @@ from hamotor.codegen.program import (
     walk,
 )
 
+RATE_JACOBIANS = {
+    *(
+        f"{name}_{kind}"
+        for name in ("dexp", "dexp_inverse")
+        for kind in ("rotation", "motion", "dual_rotation", "dual_motion", "complex")
+    ),
+    "dexp_by_doubling",
+    "dexp_inverse_by_elimination",
+}
+"""Functions of the runtime for the Jacobians of exp and log."""
 PAIRS = {
+    *RATE_JACOBIANS,
     "bivector_exponential",
     "bivector_logarithm",
     "compensated_dot_pair",

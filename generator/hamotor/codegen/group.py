@@ -39,6 +39,7 @@ class LieGroup:
     lean: the functions that are wanted in their lean form, too.
     casimirs: functions of the momentum that Poisson-commute with all of it.
     *_units: SI units of the components of elements, rates and momenta.
+    kernels: functions on request, beyond those that every group has.
     """
 
     name: str
@@ -53,6 +54,7 @@ class LieGroup:
     rate_units: tuple[str, ...]
     momentum_units: tuple[str, ...]
     lean: tuple[str, ...] = ()
+    kernels: tuple[str, ...] = ()
 
 
 def lie_group(

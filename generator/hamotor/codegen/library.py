@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import prod
 
-from hamotor.codegen import closedform, lean, nullform, transcendental
+from hamotor.codegen import closedform, jacobian, lean, nullform, transcendental
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
@@ -348,6 +348,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         ),
         _pairing(group),
     ]
+    kernels += [jacobian.jacobian_kernel(algebra, group, name, where) for name in group.kernels]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
     operations = [

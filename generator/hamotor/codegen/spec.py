@@ -63,6 +63,8 @@ LEAN_FUNCTIONS = ("exp", "log", "cayley", "cayley_inverse")
 CHAINS = ("gp", "outer", "regressive")
 """Associative operations, which take any number of operands from two on."""
 MAXIMUM_CHAIN = 6
+GROUP_KERNELS = ("dexp", "dexp_inverse")
+"""What a group's `kernels` may list; its other functions every group has."""
 
 
 @dataclass(frozen=True)
@@ -366,9 +368,8 @@ class _Reader:
             table = self.table(entry, f"group {index}")
             name = self.name(table, "name", f"group {index}")
             where = f"group {name}"
-            self.known_keys(
-                table, ("name", "description", "element", "generators", "casimirs", "lean"), where
-            )
+            keys = ("name", "description", "element", "generators", "casimirs", "kernels", "lean")
+            self.known_keys(table, keys, where)
             if any(group.name.lower() == name.lower() for group in groups):
                 raise self.fail(where, "there are two groups of that name")
             holder = self.text(table, "element", where)
@@ -418,7 +419,8 @@ class _Reader:
                         f'unknown function "{function}"; allowed are {", ".join(LEAN_FUNCTIONS)}.'
                         + suggest(str(function), LEAN_FUNCTIONS),
                     )
-            groups.append(replace(group, lean=tuple(lean)))
+            kernels = self.group_kernels(table, where)
+            groups.append(replace(group, kernels=kernels, lean=tuple(lean)))
         return tuple(groups)
 
     def casimirs(
@@ -445,6 +447,20 @@ class _Reader:
             formula = self.text(table, "formula", place, name)
             found[name] = Casimir(name, formula, parts[0], parts[1])
         return tuple(found.values())
+
+    def group_kernels(self, table: Mapping[str, Any], where: str) -> tuple[str, ...]:
+        names: list[str] = []
+        for name in self.array(table.get("kernels", []), f"{where}.kernels"):
+            if not isinstance(name, str) or name not in GROUP_KERNELS:
+                raise self.fail(
+                    f"{where}.kernels",
+                    f'unknown kernel "{name}"; those on request are {", ".join(GROUP_KERNELS)}.'
+                    + suggest(str(name), GROUP_KERNELS),
+                )
+            if name in names:
+                raise self.fail(f"{where}.kernels", f'"{name}" is listed twice')
+            names.append(name)
+        return tuple(names)
 
     def requests(
         self, data: Mapping[str, Any], elements: Mapping[str, Element]

@@ -16,6 +16,7 @@ RUNTIME_HEADERS = (
     "hamotor/scalar.hpp",
     "hamotor/bivector_exponential.hpp",
     "hamotor/bivector_logarithm.hpp",
+    "hamotor/rate_jacobian.hpp",
     "hamotor/generic.hpp",
 )
 

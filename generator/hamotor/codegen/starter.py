@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
-from hamotor.codegen.spec import MAXIMUM_DIMENSION, NAME
+from hamotor.codegen.spec import GROUP_KERNELS, MAXIMUM_DIMENSION, NAME
 from hamotor.errors import UsageError, suggest
 
 GRADE_NAMES = ("Scalar", "Vector", "Bivector", "Trivector", "Quadvector", "Quintvector")
@@ -50,7 +50,9 @@ def starter_spec(
     """The TOML text of an algebra with p positive, q negative and r null basis vectors.
 
     null_pairs: as many of the positive and negative vectors (one of each) are replaced by pairs of
-    null vectors with product −1.  products: the operations to list; all by default.
+    null vectors with product −1.  products: the kernels to list, all by default; each either an
+    operation, for the operands that come with it ("gp"; "dexp" for the group's), or one request
+    with its operands as in a spec ("gp Even Vector -> Odd").
     Raises UsageError for impossible numbers, unknown operations and too many dimensions.
     """
     p, q, r = signature
@@ -68,14 +70,8 @@ def starter_spec(
             f"signature {p},{q},{r}: {p + q + r} dimensions; {MAXIMUM_DIMENSION} are allowed "
             "(MAXIMUM_DIMENSION in codegen/spec.py lifts the cap)"
         )
-    for product in products or ():
-        if product not in PRODUCTS:
-            raise UsageError(
-                f'unknown product "{product}"; known are {", ".join(PRODUCTS)}.'
-                + suggest(product, PRODUCTS)
-            )
+    wanted = _wanted(products)
     basis, gram = _basis(p, q, r, null_pairs)
-    wanted = tuple(products) if products is not None else PRODUCTS
     lines = [
         f"# {name}: the geometric algebra R({p},{q},{r}).  Everything below may be edited.",
         f'name = "{name}"',
@@ -93,8 +89,32 @@ def starter_spec(
         *_kernels(basis, wanted, invertible=r == 0),
     ]
     if len(basis) >= 2:
-        lines += ["", *_group(basis)]
+        lines += ["", *_group(basis, [k for k in GROUP_KERNELS if k in wanted])]
     return "\n".join(lines) + "\n"
+
+
+def _wanted(products: Sequence[str] | None) -> dict[str, list[str]]:
+    """Operation → requests in full; none: those that come with the operation."""
+    known = (*PRODUCTS, *GROUP_KERNELS)
+    if products is None:
+        return {operation: [] for operation in PRODUCTS}
+    wanted: dict[str, list[str]] = {}
+    whole: set[str] = set()
+    for product in products:
+        operation, _, operands = " ".join(product.split()).partition(" ")
+        if operation not in known:
+            raise UsageError(
+                f'unknown product "{operation}"; known are {", ".join(known)}.'
+                + suggest(operation, known)
+            )
+        if operands and operation in GROUP_KERNELS:
+            raise UsageError(f'"{product}": {operation} takes no operands; it is the group\'s')
+        listed = wanted.setdefault(operation, [])
+        if operands and operands not in listed:
+            listed.append(operands)
+        if not operands:
+            whole.add(operation)
+    return {operation: [] if operation in whole else listed for operation, listed in wanted.items()}
 
 
 def _basis(p: int, q: int, r: int, null_pairs: int) -> tuple[list[str], str]:
@@ -170,7 +190,9 @@ def _elements(basis: Sequence[str]) -> list[str]:
     return lines
 
 
-def _kernels(basis: Sequence[str], wanted: Sequence[str], *, invertible: bool) -> list[str]:
+def _kernels(
+    basis: Sequence[str], wanted: Mapping[str, Sequence[str]], *, invertible: bool
+) -> list[str]:
     n = len(basis)
     name = [_grade_name(g, n) for g in range(n + 1)]
     inner_grades = range(1, n)
@@ -226,20 +248,23 @@ def _kernels(basis: Sequence[str], wanted: Sequence[str], *, invertible: bool) -
     }
     lines = []
     for operation in PRODUCTS:
-        if operation in wanted and requests[operation]:
-            entries = ", ".join(f'"{text}"' for text in dict.fromkeys(requests[operation]))
+        listed = wanted.get(operation) or (requests[operation] if operation in wanted else [])
+        if listed:
+            entries = ", ".join(f'"{text}"' for text in dict.fromkeys(listed))
             lines.append(f"{operation} = [{entries}]")
     return lines
 
 
-def _group(basis: Sequence[str]) -> list[str]:
+def _group(basis: Sequence[str], kernels: Sequence[str]) -> list[str]:
     lines = [
         "# The group of all even unit versors.  A subgroup has fewer generators, closed under the",
-        "# bracket.  Rates and momenta are coordinates over the generators.",
+        "# bracket.  Rates and momenta are coordinates over the generators.  On request, Jacobians of",
+        '# exp and log: kernels = ["dexp", "dexp_inverse"].',
         "[[group]]",
         'name = "Spin"',
         'description = "all rotations and boosts"',
         'element = "Versor"',
+        *([f"kernels = {_array(kernels)}"] if kernels else []),
         "generators = [",
     ]
     for a, b in combinations(basis, 2):
