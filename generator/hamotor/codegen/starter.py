@@ -258,8 +258,8 @@ def _kernels(
 def _group(basis: Sequence[str], kernels: Sequence[str]) -> list[str]:
     lines = [
         "# The group of all even unit versors.  A subgroup has fewer generators, closed under the",
-        "# bracket.  Rates and momenta are coordinates over the generators.  On request, Jacobians of",
-        '# exp and log: kernels = ["dexp", "dexp_inverse"].',
+        "# bracket.  Rates and momenta are coordinates over the generators.  Jacobians of exp and of",
+        '# log are there on request: kernels = ["dexp", "dexp_inverse"].',
         "[[group]]",
         'name = "Spin"',
         'description = "all rotations and boosts"',
