@@ -258,7 +258,7 @@ def _kernels(
 def _group(basis: Sequence[str], kernels: Sequence[str]) -> list[str]:
     lines = [
         "# The group of all even unit versors.  A subgroup has fewer generators, closed under the",
-        "# bracket.  Rates and momenta are coordinates over the generators.  Jacobians of exp and of",
+        "# bracket.  Rates and momenta are coordinates over the generators.  Jacobians of exp and",
         '# log are there on request: kernels = ["dexp", "dexp_inverse"].',
         "[[group]]",
         'name = "Spin"',
