@@ -39,6 +39,7 @@ class LieGroup:
     lean: the functions that are wanted in their lean form, too.
     casimirs: functions of the momentum that Poisson-commute with all of it.
     *_units: SI units of the components of elements, rates and momenta.
+    rate_lengths: the power of length in each rate's unit.
     kernels: functions on request, beyond those that every group has.
     """
 
@@ -53,6 +54,7 @@ class LieGroup:
     element_units: tuple[str, ...]
     rate_units: tuple[str, ...]
     momentum_units: tuple[str, ...]
+    rate_lengths: tuple[int, ...]
     lean: tuple[str, ...] = ()
     kernels: tuple[str, ...] = ()
 
@@ -123,6 +125,7 @@ def lie_group(
             for g, power in zip(generators, powers, strict=True)
         ),
         tuple(unit_text(1, 2 - power, -1) for power in powers),
+        tuple(powers),
     )
 
 

@@ -1,12 +1,18 @@
-"""The groups a scene can live on: the order of their components, and which dimension they act in.
+"""The groups a scene can live on: views of the algebras' specs, made when first asked for.
 
-Components stand in the order of the compiled scene's C ABI: rotations before translations, planes
-in the order 23, 31, 12.
+Components stand in the order of the specs, which is that of the compiled scene's C ABI: rotations
+before translations, planes in the order 23, 31, 12.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from hamotor.codegen.spec import AlgebraSpec
 
 
 @dataclass(frozen=True)
@@ -16,49 +22,79 @@ class Group:
     name: str
     algebra: str
     dimension: int
-    """Of the space the bodies move in: 2 or 3."""
+    """Of the space the bodies move in: 2, 3 or 4."""
     motor: tuple[str, ...]
     """Blades of a group element, in order."""
     generators: tuple[str, ...]
-    """Blades of the generators -½ e_i∧e_j and -½ e0∧e_i, in order: the keys of a momentum."""
+    """Names of the generators, in order: the keys of a momentum."""
     rotations: int
     """How many of the generators, from the first, are rotations."""
+    lengths: tuple[int, ...]
+    """The power of length in each rate: 0 for rotations and dilations, 1 for translations, −1 for
+    special conformal motions."""
+    units: tuple[str, ...]
+    """Of the momenta, in SI."""
 
     @property
     def translates(self) -> bool:
         """Whether the body frame's origin can move; otherwise it is a fixed point."""
-        return len(self.generators) > self.rotations
+        return 1 in self.lengths
 
 
-SE3 = Group(
-    name="SE3",
-    algebra="pga3",
-    dimension=3,
-    motor=("s", "e23", "e31", "e12", "e01", "e02", "e03", "e0123"),
-    generators=("e23", "e31", "e12", "e01", "e02", "e03"),
-    rotations=3,
-)
-SO3 = Group(
-    name="SO3",
-    algebra="pga3",
-    dimension=3,
-    motor=("s", "e23", "e31", "e12"),
-    generators=("e23", "e31", "e12"),
-    rotations=3,
-)
-SE2 = Group(
-    name="SE2",
-    algebra="pga2",
-    dimension=2,
-    motor=("s", "e12", "e01", "e02"),
-    generators=("e12", "e01", "e02"),
-    rotations=1,
-)
+def groups_in(spec: AlgebraSpec) -> tuple[Group, ...]:
+    """The groups of an algebra's spec, bundled or a user's own."""
+    algebra = spec.algebra
+    squares = [algebra.gram[i][i] for i in range(algebra.dimension)]
+    groups = []
+    for group in spec.groups:
+        turning = [unit == "rad/s" for unit in group.rate_units]
+        groups.append(
+            Group(
+                name=group.name,
+                algebra=spec.name,
+                dimension=sum(square != 0 for square in squares),
+                motor=tuple(c.name for c in group.element.components),
+                generators=tuple(g.name for g in group.generators),
+                rotations=[*turning, False].index(False),
+                lengths=group.rate_lengths,
+                units=group.momentum_units,
+            )
+        )
+    return tuple(groups)
 
-GROUPS = {group.name: group for group in (SE3, SO3, SE2)}
-ALGEBRAS = tuple(dict.fromkeys(group.algebra for group in GROUPS.values()))
+
+@cache
+def bundled_groups(algebra: str) -> tuple[Group, ...]:
+    """Every group of a bundled algebra; UsageError where there is no such algebra."""
+    from hamotor.codegen.spec import bundled_algebra
+
+    return groups_in(bundled_algebra(algebra))
+
+
+OPEN = {"pga3": ("SE3", "SO3"), "pga2": ("SE2",)}
+"""The groups that scenes can name, by algebra."""
+ALGEBRAS = tuple(OPEN)
 
 
 def groups_of(algebra: str) -> tuple[Group, ...]:
     """The groups of `algebra`; the first is the default, the smallest that holds any free body."""
-    return tuple(group for group in GROUPS.values() if group.algebra == algebra)
+    return tuple(group for group in bundled_groups(algebra) if group.name in OPEN[algebra])
+
+
+class _OpenGroups(Mapping[str, Group]):
+    """Name → group: names at once, groups when asked for."""
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for names in OPEN.values() for name in names)
+
+    def __len__(self) -> int:
+        return sum(len(names) for names in OPEN.values())
+
+    def __getitem__(self, name: str) -> Group:
+        for algebra, names in OPEN.items():
+            if name in names:
+                return next(group for group in groups_of(algebra) if group.name == name)
+        raise KeyError(name)
+
+
+GROUPS: Mapping[str, Group] = _OpenGroups()
