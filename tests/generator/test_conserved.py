@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from hamotor.mechanics.echelon import null_space
 from hamotor.scene import ConservedQuantity, Gravity, Scene, Spring, parse_scene, read_scene
-from hamotor.scene.conserved import null_space
 
 Array = NDArray[np.float64]
 

@@ -25,9 +25,10 @@ GROUPS = [
 Multivector = dict[int, Any]
 
 
-def body_on(algebra: str, group: str) -> Coordinates:
+def body_on(algebra: str, group: str, name: str = "body", prefix: str = "") -> Coordinates:
     spec = read_algebra(bundled_path(algebra))
-    return Coordinates("body", spec.algebra, next(g for g in spec.groups if g.name == group))
+    found = next(g for g in spec.groups if g.name == group)
+    return Coordinates(name, spec.algebra, found, prefix)
 
 
 def product(algebra: Algebra, a: Multivector, b: Multivector) -> Multivector:

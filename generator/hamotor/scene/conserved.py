@@ -27,7 +27,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hamotor.mechanics.echelon import null_space
+from hamotor.mechanics.naming import Generators
 from hamotor.scene.exact import decimal
+from hamotor.scene.groups import Group
 from hamotor.scene.interactions import Gravity, Spring
 
 if TYPE_CHECKING:
@@ -53,39 +56,6 @@ class ConservedQuantity:
     """Columns whose initial Euclidean norm is the scale of its relative error; may be empty."""
     scale: float
     """That scale in the scene's own initial state; 0 where the quantity has no natural scale."""
-
-
-def reduced_echelon(rows: Sequence[Sequence[Fraction]], columns: int) -> list[Row]:
-    """The reduced row echelon form, zero rows dropped."""
-    remaining = [list(row) for row in rows]
-    reduced: list[Row] = []
-    for column in range(columns):
-        pivot = next((row for row in remaining if row[column] != 0), None)
-        if pivot is None:
-            continue
-        remaining = [row for row in remaining if row is not pivot]
-        pivot = [x / pivot[column] for x in pivot]
-
-        def cleared(row: Row, pivot: Row = pivot, column: int = column) -> Row:
-            return [x - row[column] * p for x, p in zip(row, pivot, strict=True)]
-
-        remaining = [cleared(row) for row in remaining]
-        reduced = [cleared(row) for row in reduced] + [pivot]
-    return reduced
-
-
-def null_space(rows: Sequence[Sequence[Fraction]], columns: int) -> list[Row]:
-    """All x with rows·x = 0: a basis in reduced echelon form."""
-    reduced = reduced_echelon(rows, columns)
-    pivots = [next(k for k in range(columns) if row[k] != 0) for row in reduced]
-    basis = []
-    for free in (k for k in range(columns) if k not in pivots):
-        vector = [Fraction(0)] * columns
-        vector[free] = Fraction(1)
-        for row, pivot in zip(reduced, pivots, strict=True):
-            vector[pivot] = -row[free]
-        basis.append(vector)
-    return reduced_echelon(basis, columns)
 
 
 def _cross_with(a: Sequence[Fraction]) -> list[Row]:
@@ -180,6 +150,7 @@ def _momenta(scene: Scene) -> list[ConservedQuantity]:
     group = scene.group
     demands = _demands_on_motions(scene) if group.translates else _demands_on_rotations(scene)
     spatial = dict(zip(group.generators, scene.initial_spatial_momentum, strict=True))
+    called = _generators(group)
     quantities = []
     for element in null_space(demands, len(group.generators)):
         terms = [(g, x) for g, x in zip(group.generators, element, strict=True) if x != 0]
@@ -190,7 +161,7 @@ def _momenta(scene: Scene) -> list[ConservedQuantity]:
             group.generators[group.rotations :],
         )
         alike = rotations if angular else translations
-        suffix, description = _reading_of(scene, element, terms)
+        suffix, description = called.reading(element)
         quantities.append(
             ConservedQuantity(
                 name=f"spatial_momentum.{leading}{suffix}",
@@ -205,44 +176,11 @@ def _momenta(scene: Scene) -> list[ConservedQuantity]:
     return quantities
 
 
-def _reading_of(scene: Scene, element: Row, terms: list[tuple[str, Fraction]]) -> tuple[str, str]:
-    """The name's suffix and the words for one conserved combination."""
-    group = scene.group
-    origin = "the world's origin" if group.translates else "the fixed point"
-    if len(terms) == 1:
-        generator = terms[0][0]
-        if generator in group.generators[: group.rotations]:
-            return "", f"total angular momentum {generator} about {origin}, world frame"
-        return "", f"total linear momentum along e{generator[-1]}, world frame"
-    spelled = _spelled(terms)
-    omega, v = element[: group.rotations], element[group.rotations :]
-    one_rotation = sum(1 for w in omega if w != 0) == 1
-    if one_rotation and group.dimension == 2:
-        through = [-v[1], v[0]]  # v = -ω×A with ω = 1
-        return "_about_axis", f"{spelled}: angular momentum about {_point(through)}"
-    if one_rotation and group.translates:
-        k = next(i for i, w in enumerate(omega) if w != 0)
-        if v[k] == 0:
-            i, j = (k + 1) % 3, (k + 2) % 3
-            through = [Fraction(0)] * 3
-            through[i], through[j] = -v[j], v[i]
-            return "_about_axis", (
-                f"{spelled}: angular momentum about the axis along e{k + 1} through"
-                f" {_point(through)}"
-            )
-    return "_combination", f"{spelled}, total over the bodies, world frame"
-
-
-def _spelled(terms: list[tuple[str, Fraction]]) -> str:
-    text = terms[0][0]
-    for generator, x in terms[1:]:
-        factor = "" if abs(x) == 1 else f"{float(abs(x)):.12g}*"
-        text += f" {'-' if x < 0 else '+'} {factor}{generator}"
-    return text
-
-
-def _point(coordinates: Sequence[Fraction]) -> str:
-    return "(" + ", ".join(f"{float(x):.12g}" for x in coordinates) + ")"
+def _generators(group: Group) -> Generators:
+    turning = tuple(range(group.rotations))
+    moving = tuple(range(group.rotations, len(group.generators)))
+    kinds = ("angular",) * len(turning) + ("linear",) * len(moving)
+    return Generators(group.generators, group.dimension, turning, moving, kinds, group.translates)
 
 
 def _casimirs(scene: Scene) -> list[ConservedQuantity]:

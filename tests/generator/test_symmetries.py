@@ -1,0 +1,237 @@
+"""What the motion under a Hamiltonian conserves, found from the Hamiltonian alone."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import pytest
+import sympy
+from tests.generator.test_conserved import CASES
+from tests.generator.test_mechanics import body_on
+
+from hamotor.mechanics.coordinates import Coordinates
+from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
+from hamotor.mechanics.symmetries import conserved
+from hamotor.scene import Gravity, Scene, bundled_scenes, read_scene
+from hamotor.scene.exact import decimal
+
+Q = sympy.Rational
+ZERO = sympy.Integer(0)
+SCENES = {name: read_scene(name) for name, _ in bundled_scenes()} | CASES
+
+
+def free(body: Coordinates, *inertia: Any) -> Any:
+    """Σ μ_i²/2J_i."""
+    return sum(p**2 / (2 * Q(j)) for p, j in zip(body.momenta, inertia, strict=True))
+
+
+def exact(numbers: Any) -> tuple[Any, ...]:
+    return tuple(Q(decimal(x).numerator, decimal(x).denominator) for x in numbers)
+
+
+def hamiltonian_of(scene: Scene) -> Hamiltonian:
+    """½ μ K⁻¹ μ − Σ m g·x + Σ ½ k (|Δ| − ℓ)², in the scene's decimals."""
+    bodies = {}
+    energy = ZERO
+    for b in scene.bodies:
+        body = body_on(scene.algebra, scene.group.name, b.name, f"{b.name}.")
+        assert tuple(g.name for g in body.group.generators) == scene.group.generators
+        bodies[b.name] = body, (exact(b.position) if not scene.group.translates else None)
+        inertia = sympy.Matrix([list(exact(row)) for row in b.kinetic_matrix])
+        mu = sympy.Matrix(body.momenta)
+        energy += (mu.T * inertia.inv() * mu)[0] / 2
+
+    def end(name: str, at: Any) -> tuple[Any, ...]:
+        body, fixed = bodies[name]
+        y = body.at(exact(at)) if any(at) or fixed is None else (ZERO,) * len(at)
+        return y if fixed is None else tuple(a + b for a, b in zip(y, fixed, strict=True))
+
+    for acting in scene.interactions:
+        if isinstance(acting, Gravity):
+            for b in scene.bodies:
+                heights = zip(
+                    exact(acting.acceleration), end(b.name, b.center_of_mass), strict=True
+                )
+                energy -= exact([b.mass])[0] * sum(g * x for g, x in heights)
+            continue
+        near = end(acting.body, acting.at)
+        far = exact(acting.anchor) if acting.other is None else end(acting.other, acting.other_at)
+        length = sympy.sqrt(sum((x - y) ** 2 for x, y in zip(near, far, strict=True)))
+        stiffness, rest = exact([acting.stiffness, acting.rest_length])
+        energy += stiffness * (length - rest) ** 2 / 2
+    return Hamiltonian(tuple(body for body, _ in bodies.values()), energy)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_rigid_scenes_conserve_what_their_exact_linear_algebra_says(name: str) -> None:
+    scene = SCENES[name]
+    hamiltonian = hamiltonian_of(scene)
+    found = {q.name: q for q in conserved(hamiltonian)}
+    for expected in scene.conserved:
+        q = found.pop(expected.name)
+        assert q.unit == expected.unit
+        assert tuple((g, float(x)) for g, x in q.coefficients) == expected.coefficients
+        if not expected.body:
+            assert q.description == expected.description
+    assert not {n for n in found if ".momentum." not in n}
+
+
+def names(hamiltonian: Hamiltonian) -> list[str]:
+    return [q.name for q in conserved(hamiltonian)]
+
+
+def top(energy: Any, *inertia: Any) -> Hamiltonian:
+    body = body_on("pga3", "SO3", "top")
+    weight = body.at((ZERO, ZERO, Q("0.05")))[2] if energy else ZERO
+    return Hamiltonian((body,), free(body, *inertia) + energy * weight)
+
+
+def test_a_symmetric_top_keeps_its_spin_and_an_asymmetric_one_does_not() -> None:
+    assert names(top(Q("1.7"), 1, 1, "2.5")) == [
+        "energy",
+        "spatial_momentum.e12",
+        "top.momentum.e12",
+    ]
+    assert names(top(Q("1.7"), 1, "1.000001", "2.5")) == ["energy", "spatial_momentum.e12"]
+
+
+def test_an_axis_of_symmetry_may_lie_anywhere_in_the_body() -> None:
+    body = body_on("cl3", "SO3", "top")
+    along = sum(a * p for a, p in zip((3, 0, 4), body.momenta, strict=True))
+    energy = sum(p**2 for p in body.momenta) / 2 + Q(1, 7) * along**2
+    (spin,) = (q for q in conserved(Hamiltonian((body,), energy)) if q.name.startswith("top.mom"))
+    assert spin.name == "top.momentum.e23_combination"
+    assert spin.description == "e23 + 1.33333333333*e12, of top, body frame"
+    assert sympy.expand(spin.expression - along / 3) == 0
+    assert spin.proved
+
+
+def test_a_plate_spins_about_its_centre_of_mass_wherever_it_pulls() -> None:
+    body = body_on("pga2", "SE2", "plate")
+    spin, p1, p2 = body.momenta
+    centre = body.at((Q(1, 2), Q(-1, 3)))
+    about_centre = spin + p1 * Q(-1, 3) - p2 * Q(1, 2)
+    energy = (p1**2 + p2**2 + about_centre**2) / 2 + sum(x**2 for x in centre)
+    own = {q.name: q for q in conserved(Hamiltonian((body,), energy)) if q.kind == "own"}
+    assert list(own) == ["plate.momentum.e12_about_axis"]
+    found = own["plate.momentum.e12_about_axis"]
+    assert sympy.expand(found.expression - about_centre) == 0
+    assert "about (0.5, -0.333333333333)" in found.description
+
+
+def test_a_body_that_only_translates_reports_each_momentum_once() -> None:
+    body = body_on("pga3", "T3")
+    energy = free(body, 1, 1, 1) + body.position[2] ** 2
+    assert names(Hamiltonian((body,), energy)) == [
+        "energy",
+        "spatial_momentum.e01",
+        "spatial_momentum.e02",
+    ]
+
+
+def test_a_couple_leaves_linear_momentum_and_its_square() -> None:
+    body = body_on("pga3", "SE3")
+    energy = free(body, 1, 2, 3, 4, 5, 6) + 3 * body.rotation[2][1]
+    assert names(Hamiltonian((body,), energy)) == [
+        "energy",
+        "spatial_momentum.e12",
+        "spatial_momentum.e01",
+        "spatial_momentum.e02",
+        "spatial_momentum.e03",
+        "body.casimir.p_squared",
+    ]
+
+
+def test_what_is_applied_is_pulled_to_the_world() -> None:
+    body = body_on("pga3", "SE3")
+    energy = free(body, 1, 2, 3, 4, 4, 4)
+    upward = tuple(body.rotation[2])
+    pulled = Hamiltonian((body,), energy, {}, ((ZERO, ZERO, ZERO, *upward),))
+    assert names(pulled) == [
+        "energy_balance",
+        "spatial_momentum.e12",
+        "spatial_momentum.e01",
+        "spatial_momentum.e02",
+    ]
+    damped = Hamiltonian((body,), energy, {}, (tuple(p / 9 for p in body.momenta),))
+    assert names(damped) == ["energy_balance"]
+
+
+def test_time_is_no_symmetry_but_space_may_be() -> None:
+    body = body_on("pga3", "SE3")
+    energy = free(body, 1, 2, 3, 4, 4, 4) + sympy.cos(3 * TIME) * body.position[0]
+    assert names(Hamiltonian((body,), energy)) == [
+        "energy_balance",
+        "spatial_momentum.e23",
+        "spatial_momentum.e02",
+        "spatial_momentum.e03",
+    ]
+
+
+def test_a_quantity_that_only_one_branch_of_an_absolute_value_keeps_is_not_listed() -> None:
+    body = body_on("pga3", "T3")
+    depth = body.position[2] + 1000
+    energy = free(body, 1, 1, 1) + (sympy.Abs(depth) - depth) ** 2
+    assert names(Hamiltonian((body,), energy)) == [
+        "energy",
+        "spatial_momentum.e01",
+        "spatial_momentum.e02",
+    ]
+
+
+def test_a_weak_symmetry_breaking_is_seen_beside_a_huge_force() -> None:
+    body = body_on("pga3", "SE3")
+    heavy = Q(10) ** 24
+    energy = free(body, heavy, 2 * heavy, 3 * heavy, heavy, heavy, heavy)
+    energy += heavy**2 / sympy.sqrt(sum(x**2 for x in body.position))
+    assert names(Hamiltonian((body,), energy)) == [
+        "energy",
+        "spatial_momentum.e23",
+        "spatial_momentum.e31",
+        "spatial_momentum.e12",
+    ]
+
+
+def test_a_direction_given_by_rounded_irrational_numbers_is_found() -> None:
+    body = body_on("pga3", "SE3")
+    energy = free(body, 1, 2, 3, 4, 4, 4)
+    direction = Q(str(sympy.sin(Q(3, 10)).evalf(60))), Q(str(sympy.cos(Q(3, 10)).evalf(60)))
+    energy += direction[0] * body.position[0] + direction[1] * body.position[2]
+    found = {q.name: q for q in conserved(Hamiltonian((body,), energy))}
+    assert list(found) == [
+        "energy",
+        "spatial_momentum.e23_combination",
+        "spatial_momentum.e01_combination",
+        "spatial_momentum.e02",
+    ]
+    slope = found["spatial_momentum.e01_combination"].coefficients[1][1]
+    assert abs(slope + Fraction(str(sympy.tan(Q(3, 10)).evalf(60)))) < Fraction(1, 10**55)
+
+
+@pytest.mark.parametrize(
+    ("algebra", "group"), [("cga3", "SO41"), ("cga3", "Sim3"), ("pga4", "SO4"), ("cga2", "SO31")]
+)
+def test_free_bodies_keep_every_spatial_momentum_and_every_casimir(
+    algebra: str, group: str
+) -> None:
+    body = body_on(algebra, group)
+    energy = free(body, *range(1, len(body.momenta) + 1))
+    found = conserved(Hamiltonian((body,), energy))
+    assert [q.name for q in found] == [
+        "energy",
+        *(f"spatial_momentum.{g.name}" for g in body.group.generators),
+        *(f"body.casimir.{c.name}" for c in body.group.casimirs),
+    ]
+    assert all(q.proved for q in found)
+
+
+def test_two_bodies_keep_the_total_and_a_symmetric_one_its_spin() -> None:
+    a, b = (body_on("pga3", "SE3", name, f"{name}.") for name in "ab")
+    gap = sum((x - y) ** 2 for x, y in zip(a.position, b.at((Q(1, 5), ZERO, ZERO)), strict=True))
+    energy = free(a, 1, 1, 2, 3, 3, 3) + free(b, 1, 1, 2, 3, 3, 3) + (sympy.sqrt(gap) - 1) ** 2
+    assert names(Hamiltonian((a, b), energy)) == [
+        "energy",
+        *(f"spatial_momentum.{g.name}" for g in a.group.generators),
+        "a.momentum.e12",
+    ]
