@@ -319,7 +319,7 @@ def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: s
     writer = Writer()
     value = value_of(parameter)
     if len({g % 2 for g in operand.grades}) != 1:
-        raise UsageError(f"{where}: {operand.name} must be even or odd")
+        return _mixed_inverse_kernel(algebra, parameter, result, where)
     square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
     parts = square_of(algebra, writer, square, "q", where)
     norm = writer.let("norm2", polynomial_expression(parts.number))
@@ -339,9 +339,75 @@ def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: s
             slip = writer.let("turn", Product(slip, polynomial_expression(p)))
             turned = poly.apply_bilinear(algebra.geometric, reversed_, {blade: {(): 1}})
         out = _combination([(factor, reversed_), (slip, turned)], {})
+    return _inverse(algebra, parameter, writer, out, result, where)
+
+
+def _inverse(
+    algebra: Algebra,
+    parameter: Parameter,
+    writer: Writer,
+    out: Mapping[Blade, Expression],
+    result: Element,
+    where: str,
+) -> Kernel:
+    if lost := [algebra.blade_name(b) for b in sorted(out) if b not in result.blades]:
+        raise UsageError(
+            f"{where}: the inverse has parts along {', '.join(lost)}, which {result.name} does not "
+            'hold; name a type that does with "-> RESULT"'
+        )
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Not finite where a has no inverse.",)
     return Kernel("inverse", "a⁻¹: a a⁻¹ = 1", program, None, "", None, notes)
+
+
+def _mixed_inverse_kernel(
+    algebra: Algebra, parameter: Parameter, result: Element, where: str
+) -> Kernel:
+    """A⁻¹ for any multivector, n ≤ 5, by involutions (Hitzer & Sangwine 2017, Shirokov 2021).
+
+    With A′ the Clifford conjugate, [B]ₖ a sign change of the grades k: B = A A′ has grades 0, 3, 4;
+    C = B [B]₃₄ is a number for n ≤ 4.  For n = 5 C = B [B]₃ has grades 0, 1, 4 and C [C]₁₄ is a
+    number N.  A⁻¹ = A′ [B]₃ [C]₁₄ / N, or A′ [B]₃₄ / N.  These are identities of polynomials in the
+    components and the Gram matrix, so that they hold in degenerate algebras and in oblique bases.
+    """
+    if algebra.dimension > MAXIMUM_DIMENSION:
+        raise UsageError(
+            f"{where}: the inverse of a multivector that is neither even nor odd exists for at "
+            f"most {MAXIMUM_DIMENSION} dimensions; {algebra.name} has {algebra.dimension}"
+        )
+    writer = Writer()
+
+    def bound(prefix: str, value: PolynomialMultivector) -> PolynomialMultivector:
+        named = {
+            b: writer.let_polynomial(f"{prefix}_{algebra.blade_name(b)}", p)
+            for b, p in sorted(value.items())
+        }
+        return {b: p for b, p in named.items() if p}
+
+    def product(a: PolynomialMultivector, b: PolynomialMultivector) -> PolynomialMultivector:
+        return poly.apply_bilinear(algebra.geometric, a, b)
+
+    def flipped(value: PolynomialMultivector, *grades: int) -> PolynomialMultivector:
+        return {b: poly.scaled(p, -1 if grade(b) in grades else 1) for b, p in value.items()}
+
+    value = value_of(parameter)
+    adjugate = {b: poly.scaled(p, (-1) ** grade(b)) for b, p in reversed_value(value).items()}
+    # Grades whose sign changes, and grades of the product, which as names they no longer show.
+    last = ((1, 4), (0,)) if algebra.dimension == MAXIMUM_DIMENSION else ((3, 4), (0,))
+    stages = [last] if algebra.dimension < MAXIMUM_DIMENSION else [((3,), (0, 1, 4)), last]
+    norm = bound("b", product(value, adjugate))
+    for name, (changed, kept) in zip("cd", stages, strict=False):
+        if not norm.keys() - {0}:
+            break
+        factor = flipped(norm, *changed)
+        adjugate = bound(f"{name}_adjugate", product(adjugate, factor))
+        norm = bound(name, {b: p for b, p in product(norm, factor).items() if grade(b) in kept})
+    denominator = polynomial_expression(norm.get(0, {}))
+    inverse = writer.let("inverse", Quotient(ONE, denominator))
+    out: dict[Blade, Expression] = {
+        b: Product(inverse, polynomial_expression(p)) for b, p in adjugate.items()
+    }
+    return _inverse(algebra, parameter, writer, out, result, where)
 
 
 def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
