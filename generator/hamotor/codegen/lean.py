@@ -93,7 +93,8 @@ def exp_kernel(
         along = writer.let("along", Select(squares, share, ZERO))
         turned = axis_part(plane, u)
         for blade in plane.translation:
-            out[blade] = MultiplyAdd(along, turned[blade], Product(spin, b[blade]))
+            moved = Product(spin, b[blade])
+            out[blade] = MultiplyAdd(along, turned[blade], moved) if blade in turned else moved
         out[quadrivector(plane)] = Product(_times(factor, spin), product)
     else:
         for blade in plane.translation:

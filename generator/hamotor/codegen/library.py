@@ -368,7 +368,10 @@ def _simple(algebra: Algebra, operand: Element) -> bool:
     """Whether the forms that are accurate for every input apply to the operand's bivectors."""
     bivectors = [b for b in operand.blades if grade(b) == 2]
     plane = transcendental.split_bivectors(algebra, bivectors)
-    return plane is not None and bool(plane.rotation)
+    if plane is None or not plane.rotation:
+        return False
+    # Of a motor, the forms need the whole of space: a translation along every axis of rotation.
+    return 0 not in operand.blades or not plane.pitch or set(plane.along) == {*plane.translation}
 
 
 def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedForm:

@@ -22,7 +22,8 @@ BUNDLED = Path(__file__).resolve().parents[2] / "algebras"
 MAXIMUM_DIMENSION = 8
 MAXIMUM_BYTES = 1 << 20
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
-KEYS = ("name", "description", "basis", "gram", "lengths", "element", "kernels", "group")
+INHERITED = ("basis", "gram", "lengths")
+KEYS = ("name", "description", "extends", *INHERITED, "element", "kernels", "group")
 OPERATIONS = {
     "gp": 2,
     "outer": 2,
@@ -183,11 +184,14 @@ def parse_algebra(text: str, file: str) -> AlgebraSpec:
         raise UsageError(f"{file}: not valid TOML: {error}") from error
     reader = _Reader(file)
     reader.known_keys(data, KEYS, "")
+    base = ""
+    if "extends" in data:
+        base = reader.extended(data)
     algebra = reader.algebra(data)
     elements = reader.elements(data, algebra)
     groups = reader.groups(data, algebra, elements)
     requests = reader.requests(data, elements)
-    digest = hashlib.sha256(text.encode()).hexdigest()
+    digest = hashlib.sha256((base + text).encode()).hexdigest()
     description = reader.text(data, "description", "")
     return AlgebraSpec(file, description, digest, algebra, elements, groups, requests)
 
@@ -202,6 +206,29 @@ class _Reader:
         return UsageError(
             f"{self.file}: {where}: {message}" if where else f"{self.file}: {message}"
         )
+
+    def extended(self, data: dict[str, Any]) -> str:
+        """Add the metric and the element types of the bundled algebra that `data` extends.
+
+        Returns that algebra's text.  Its kernels and groups are not taken over.
+        """
+        name = self.text(data, "extends", "")
+        if name not in bundled_algebras():
+            known = bundled_algebras()
+            raise self.fail(
+                "extends",
+                f'unknown algebra "{name}"; bundled are {", ".join(known)}.{suggest(name, known)}',
+            )
+        base_text = read_text(bundled_path(name))
+        base = tomllib.loads(base_text)
+        for key in INHERITED:
+            if key in data:
+                raise self.fail(key, f'is that of {name}, which "extends" names; leave it out')
+            if key in base:
+                data[key] = base[key]
+        own = self.table(data.get("element", {}), "element")
+        data["element"] = {**base["element"], **own}
+        return base_text
 
     def known_keys(self, table: Mapping[str, Any], allowed: tuple[str, ...], where: str) -> None:
         for key in table:

@@ -278,7 +278,9 @@ def exp_kernel(
         along = writer.let("along", Product(Sum(sinc, Negative(cosine)), share))
         axis = axis_part(plane, w.values)
         for blade in plane.translation:
-            moved = MultiplyAdd(along, axis[blade], Product(sinc, v.values[blade]))
+            moved: Expression = Product(sinc, v.values[blade])
+            if blade in axis:
+                moved = MultiplyAdd(along, axis[blade], moved)
             out[blade] = Product(v.outward, moved)
         out[quadrivector(plane)] = Product(v.outward, Product(spin, product))
     else:
@@ -425,7 +427,9 @@ def cayley_kernel(
         pitch_low = writer.let("pitch_low", Product(number(2), Name("ratio.lo")))
         axis = axis_part(plane, r.values)
         for v, x in q.values.items():
-            moved = MultiplyAdd(pitch_low, axis[v], MultiplyAdd(pitch, axis[v], x))
+            moved = x
+            if v in axis:
+                moved = MultiplyAdd(pitch_low, axis[v], MultiplyAdd(pitch, axis[v], x))
             out[v] = Product(Product(Product(twice, moved), root), root)
         screw = Product(Product(Product(factor, pitch), root), root)
         out[quadrivector(plane)] = screw
