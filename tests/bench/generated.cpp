@@ -81,6 +81,20 @@ struct Generated {
   }
 };
 
+/// The forms with the fewest operations, accurate where nothing is extreme.
+template <class S>
+struct GeneratedLean : Generated<S> {
+  static constexpr const char* name = "generated, lean";
+  using typename Generated<S>::Motion;
+  using typename Generated<S>::Rate;
+
+  [[nodiscard]] HAMOTOR_INLINE static Motion exp(const Rate& w) { return pga3::se3::exp_lean(w); }
+  [[nodiscard]] HAMOTOR_INLINE static Rate log(const Motion& m) { return pga3::se3::log_lean(m); }
+  [[nodiscard]] HAMOTOR_INLINE static Motion normalize(const Motion& m) {
+    return pga3::normalize_lean(m);
+  }
+};
+
 template <class Op>
 Values reference(const Exact<typename Op::A>& a, const Exact<typename Op::B>& b) {
   return values(Op::template run<Generated<Quad>>(a, b));
@@ -106,6 +120,12 @@ template Values reference<operation::RungeKutta>(const kind::Nothing&, const Bod
 template Values reference<operation::Rkmk4>(const kind::Nothing&, const Body<Quad>&);
 template Values reference<operation::Splitting2>(const kind::Nothing&, const Body<Quad>&);
 
-void enter_generated() { enter<Generated>(); }
+void enter_generated() {
+  enter<Generated>();
+  enter_for<GeneratedLean, operation::Exp>();
+  enter_for<GeneratedLean, operation::Log>();
+  enter_for<GeneratedLean, operation::ExpLog>();
+  enter_for<GeneratedLean, operation::Normalize>();
+}
 
 }  // namespace bench

@@ -219,3 +219,17 @@ def test_cpp_and_python_evaluate_alike(tmp_path: Path) -> None:
     found = [float(line) for line in run.stdout.splitlines()]
     assert len(found) == len(expected) > 300
     assert all(math.isclose(a, b, rel_tol=1e-14) for a, b in zip(found, expected, strict=True))
+
+
+def test_the_page_lists_every_kernel_with_its_cost() -> None:
+    for algebra, kernels in LIBRARIES.items():
+        page = (ROOT / "generated" / "hamotor" / algebra / "kernels.md").read_text("utf-8")
+        rows = [line for line in page.splitlines() if line.startswith("| `")]
+        assert len(rows) == len(kernels)
+        for kernel in kernels:
+            cost = kernel.program.cost
+            operands = ", ".join(e.cpp_name for e in kernel.operands)
+            assert any(
+                f" {kernel.name}({operands})` | " in row and f" | {cost.mul} | {cost.add} | " in row
+                for row in rows
+            ), kernel.name

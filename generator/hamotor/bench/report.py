@@ -13,6 +13,7 @@ _BLUE, _SKY, _GREY = "#0072B2", "#56B4E9", "#8a8a8a"
 _ORANGE, _VERMILLION, _GREEN, _PURPLE = "#E69F00", "#D55E00", "#009E73", "#CC79A7"
 _COLOURS = {
     "generated": _BLUE,
+    "generated, lean": "#4f9bd9",
     "Eigen quaternion + translation": _ORANGE,
     "Eigen Isometry3": _VERMILLION,
     "Eigen 4x4 matrix": _PURPLE,

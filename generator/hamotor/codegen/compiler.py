@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -73,6 +74,7 @@ def compile_algebra(spec: AlgebraSpec) -> tuple[SourceFile, ...]:
         )
     )
     files.append(SourceFile(f"{folder}/kernels.json", _index(spec, kernels)))
+    files.append(SourceFile(f"{folder}/kernels.md", _page(spec, folder, kernels)))
     return tuple(files)
 
 
@@ -299,6 +301,57 @@ def _index(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
         ],
     }
     return json.dumps(data, indent=1, ensure_ascii=False) + "\n"
+
+
+def accuracy(kernel: Kernel) -> str:
+    """What is promised of a kernel's error, in one or two words."""
+    if kernel.meaning is not None:
+        return "polynomial"
+    said = " ".join(kernel.notes)
+    bound = re.search(r"at most (\d+) ulp", said)
+    if said.startswith("Lean:"):
+        return f"{bound[1]} ulp, in a range" if bound else "lean"
+    return f"{bound[1]} ulp" if bound else "closed form"
+
+
+def _page(spec: AlgebraSpec, folder: str, kernels: Sequence[Kernel]) -> str:
+    """The index of all kernels, to be read."""
+    places = [("", f"Functions of {spec.name}", "kernels")]
+    places += [
+        (g.rate.namespace, f"Group {g.name}: {g.description}", f"{g.rate.namespace}_kernels")
+        for g in spec.groups
+    ]
+    groups = [
+        {
+            "title": title,
+            "header": f"{folder}/{file}.hpp",
+            "kernels": [_row(k) for k in kernels if k.namespace == namespace],
+        }
+        for namespace, title, file in places
+    ]
+    return render(
+        "kernels.md.jinja",
+        name=spec.name,
+        description=spec.description,
+        count=len(kernels),
+        groups=groups,
+    )
+
+
+def _row(kernel: Kernel) -> dict[str, str]:
+    cost = kernel.program.cost
+    calls = [name if n == 1 else f"{n} {name}" for name, n in sorted(cost.calls.items())]
+    result = cpp.scalar_type(kernel.program.result).replace("<S>", "")
+    operands = ", ".join(e.cpp_name for e in kernel.operands)
+    return {
+        "signature": f"{result} {kernel.name}({operands})",
+        "law": kernel.law.replace("|", "\\|"),
+        "mul": str(cost.mul),
+        "add": str(cost.add),
+        "div": str(cost.div) if cost.div else "",
+        "calls": ", ".join(calls),
+        "accuracy": accuracy(kernel),
+    }
 
 
 def _element_index(algebra: Algebra, element: Element) -> dict[str, Any]:

@@ -77,9 +77,9 @@ class Rkmk4 {
   static constexpr int order = 4;
   static constexpr std::string_view name = "rkmk4";
 
-  /// Takes `state` from t to t + h.
-  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
-                         const S& h) noexcept {
+  /// Takes `state` from t to t + h.  Flat: a slope that is called returns through memory.
+  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                                          const S& h) noexcept {
     const S half_step = S(0.5) * h;
     const Slope one = slope(system, state, t, Rates{});
     const Slope two = slope_at(system, state, t, half_step, one);
