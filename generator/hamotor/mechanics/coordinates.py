@@ -215,19 +215,24 @@ class Coordinates:
             self._points[place] = Point(
                 tuple(self._symbol(f"{name}{axis}") for axis in "xyzw"[: self.dimension]),
                 place,
-                tuple(
-                    tuple(
-                        _exact(v[j])
-                        + _sum(_exact(turn[j][k]) * a for k, a in enumerate(place))
-                        + _exact(growth) * place[j]
-                        for j in range(self.dimension)
-                    )
-                    for v, turn, growth in zip(
-                        self.space.velocities, self.space.turns, self.space.growths, strict=True
-                    )
-                ),
+                self.velocities_at(place),
             )
         return self._points[place].symbols
+
+    def velocities_at(self, place: tuple[Expr, ...]) -> tuple[tuple[Expr, ...], ...]:
+        """ξ_i(a), what each generator does to a point a: of the body's or of the world's space."""
+        d = range(self.dimension)
+        return tuple(
+            tuple(
+                _exact(v[j])
+                + _sum(_exact(turn[j][k]) * a for k, a in enumerate(place))
+                + _exact(growth) * place[j]
+                for j in d
+            )
+            for v, turn, growth in zip(
+                self.space.velocities, self.space.turns, self.space.growths, strict=True
+            )
+        )
 
     @property
     def position(self) -> tuple[Expr, ...]:
@@ -246,18 +251,6 @@ class Coordinates:
     def pulled_back(self, gradient: tuple[Expr, ...]) -> tuple[Expr, ...]:
         """s Rᵀ g, for the gradient g of a potential at a point of the body."""
         return tuple(self.scale * x for x in self.turned_back(gradient))
-
-    def spatial_velocity(self, generator: int, y: tuple[Expr, ...]) -> tuple[Expr, ...]:
-        """ξ_i(y), what generator i of the world does to a point of the world."""
-        space = self.space
-        velocity, turn = space.velocities[generator], space.turns[generator]
-        growth = space.growths[generator]
-        return tuple(
-            _exact(velocity[j])
-            + _sum(_exact(turn[j][k]) * x for k, x in enumerate(y))
-            + _exact(growth) * y[j]
-            for j in range(self.dimension)
-        )
 
     def turned(self, direction: tuple[Expr, ...]) -> tuple[Expr, ...]:
         """R n: a direction of the body in the world."""

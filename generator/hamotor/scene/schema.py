@@ -9,7 +9,7 @@ from __future__ import annotations
 import textwrap
 from dataclasses import dataclass
 
-from hamotor.scene.groups import ALGEBRAS, GROUPS, Group
+from hamotor.scene.groups import Group
 
 METHODS = ("auto", "rkmk4", "splitting2")
 NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]*"
@@ -21,10 +21,18 @@ MOST_BYTES = 1 << 20
 LARGEST = 1e36
 """Numbers lie within ±LARGEST and positive ones above 1/LARGEST: their products stay finite."""
 
-EVERY_GROUP = tuple(GROUPS)
-SPATIAL = ("SE3", "SO3")
-PLANAR = ("SE2",)
-TRANSLATING = ("SE3", "SE2")
+EVERYWHERE, SPATIAL, PLANAR, TRANSLATING, SCALING = "", "3-D", "2-D", "translating", "scaling"
+
+
+def _means_something(where: str, group: Group) -> bool:
+    """Whether a key that is for such groups is for this one."""
+    return {
+        EVERYWHERE: True,
+        SPATIAL: group.dimension == 3,
+        PLANAR: group.dimension == 2,
+        TRANSLATING: group.translates,
+        SCALING: group.scales,
+    }[where]
 
 
 @dataclass(frozen=True)
@@ -42,7 +50,8 @@ class Key:
     """As TOML; None where the key is required, or left out with a meaning of its own."""
     example: str = ""
     """As TOML, for the starter scene; the default where empty."""
-    groups: tuple[str, ...] = EVERY_GROUP
+    where: str = EVERYWHERE
+    """On which groups it means something."""
     active: bool = True
     """Whether the starter scene sets it; otherwise it stands there as a comment."""
 
@@ -63,7 +72,7 @@ class Section:
 
     def names(self, group: Group) -> list[str]:
         """The keys that mean something on `group`."""
-        return [key.name for key in self.keys if group.name in key.groups]
+        return [key.name for key in self.keys if _means_something(key.where, group)]
 
 
 SCENE = Section(
@@ -71,17 +80,25 @@ SCENE = Section(
     "a scene",
     (
         Key("description", "text", "one line about the scene", default='""', example='"my scene"'),
-        Key("algebra", "one of", " or ".join(ALGEBRAS), example='"pga3"'),
+        Key(
+            "algebra",
+            "one of",
+            "pga3, pga2, or any other of `./hamotor list algebras`",
+            example='"pga3"',
+        ),
         Key(
             "group",
             "one of",
             "SE3: moves freely in space; SO3: turns about the body frame's origin, a fixed point;"
-            " SE2: moves in the plane. Left out: SE3 in pga3, SE2 in pga2",
+            " SE2: moves in the plane; Sim3 (cga3): also grows and shrinks; and every other group of"
+            " the algebra. Left out: the first of the algebra's spec",
             example='"SE3"',
             active=False,
         ),
         Key("body", "tables", "the bodies, at least one"),
         Key("interaction", "tables", "what acts on them", default="[]"),
+        Key("hamiltonian", "table", "H, instead of masses"),
+        Key("lagrangian", "table", "L, instead of masses"),
         Key("time", "table", "how far and how finely to integrate"),
         Key("output", "table", "what to record", default="{}"),
         Key("limits", "table", "how large a scene may be", default="{}"),
@@ -116,7 +133,7 @@ BODY = Section(
             "instead of inertia: a uniform ellipsoid with these semi-axes",
             unit="m",
             example="[0.1, 0.2, 0.3]",
-            groups=SPATIAL,
+            where=SPATIAL,
             active=False,
         ),
         Key(
@@ -125,7 +142,7 @@ BODY = Section(
             "instead of inertia: a uniform cylinder about the body's third axis",
             unit="m",
             example="{ radius = 0.1, height = 0.3 }",
-            groups=SPATIAL,
+            where=SPATIAL,
             active=False,
         ),
         Key(
@@ -133,7 +150,7 @@ BODY = Section(
             "positive",
             "instead of inertia: a uniform disk of this radius",
             unit="m",
-            groups=PLANAR,
+            where=PLANAR,
             example="0.1",
             active=False,
         ),
@@ -176,7 +193,7 @@ BODY = Section(
             "of the body frame's origin, components in the body frame",
             unit="m/s",
             default="0",
-            groups=TRANSLATING,
+            where=TRANSLATING,
         ),
         Key(
             "angular_velocity",
@@ -198,14 +215,71 @@ BODY = Section(
     ),
 )
 
+GENERAL_BODY = Section(
+    "[[body]]",
+    "a body",
+    (
+        *BODY.keys,
+        Key(
+            "kinetic_matrix",
+            "matrix",
+            "instead of mass and inertia: the symmetric matrix K of the kinetic energy ½ Bᵀ K B,"
+            " rows and columns in the order of the group's generators",
+            active=False,
+        ),
+        Key(
+            "second_moments",
+            "lengths",
+            "instead of inertia, in any dimension: Σ m x_k², about the centre of mass",
+            unit="kg m^2",
+            active=False,
+        ),
+        Key(
+            "scale", "positive", "by how much it is enlarged", where=SCALING, default="1.0",
+            active=False,
+        ),
+        Key(
+            "motor",
+            "table",
+            "instead of position, orientation and scale: the components of M by their blades",
+            example="{ s = 1 }",
+            active=False,
+        ),
+        Key(
+            "rate",
+            "table",
+            "instead of the velocities: the components of B by the group's generators",
+            active=False,
+        ),
+    ),
+)
+
+HAMILTONIAN = Section(
+    "[hamiltonian]",
+    "a Hamiltonian",
+    (
+        Key("expression", "expression", "of momenta, places and parameters", unit="J"),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+    ),
+)
+
+LAGRANGIAN = Section(
+    "[lagrangian]",
+    "a Lagrangian",
+    (
+        Key("expression", "expression", "of rates, places and parameters", unit="J"),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+    ),
+)
+
 ORIENTATION = Section(
     "orientation",
     "an orientation",
     (
-        Key("axis", "vector", "of any length but zero", groups=SPATIAL),
+        Key("axis", "vector", "of any length but zero", where=SPATIAL),
         Key("angle", "number", "of the rotation, anticlockwise", unit="rad"),
-        Key("quaternion", "quaternion", "[w, x, y, z], unit", groups=SPATIAL),
-        Key("matrix", "matrix", "orthogonal, determinant 1, rows first", groups=SPATIAL),
+        Key("quaternion", "quaternion", "[w, x, y, z], unit", where=SPATIAL),
+        Key("matrix", "matrix", "orthogonal, determinant 1, rows first", where=SPATIAL),
     ),
 )
 
@@ -213,7 +287,7 @@ MOMENTUM = Section(
     "momentum",
     "a momentum",
     (
-        Key("linear", "vector", "", unit="kg m/s", default="0", groups=TRANSLATING),
+        Key("linear", "vector", "", unit="kg m/s", default="0", where=TRANSLATING),
         Key("angular", "rotation", "", unit="kg m^2/s", default="0"),
     ),
 )
@@ -274,7 +348,107 @@ SPRING = Section(
     ),
 )
 
-INTERACTIONS = {"gravity": GRAVITY, "spring": SPRING}
+POTENTIAL = Section(
+    "[[interaction]]",
+    "a potential",
+    (
+        Key("type", "one of", "any potential energy", example='"potential"'),
+        Key("expression", "expression", "of places, parameters and the time", unit="J"),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+    ),
+)
+
+FORCE = Section(
+    "[[interaction]]",
+    "a force",
+    (
+        Key("type", "one of", "a force at a point that no potential has", example='"force"'),
+        Key("body", "name", "what it acts on"),
+        Key("at", "vector", "where, in that body's frame", unit="m", default="0"),
+        Key(
+            "expression",
+            "expression",
+            "in the world frame, of places, momenta, rates, parameters and the time",
+            unit="N",
+        ),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+    ),
+)
+
+TORQUE = Section(
+    "[[interaction]]",
+    "a torque",
+    (
+        Key("type", "one of", "a couple that no potential has", example='"torque"'),
+        Key("body", "name", "what it acts on"),
+        Key(
+            "expression",
+            "expression",
+            "in the world frame, of places, momenta, rates, parameters and the time",
+            unit="N m",
+        ),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+    ),
+)
+
+DAMPING = Section(
+    "[[interaction]]",
+    "damping",
+    (
+        Key("type", "one of", "a forque against the body's rates", example='"damping"'),
+        Key("body", "name", "what it acts on"),
+        Key("linear", "non-negative", "against V", unit="kg/s", default="0.0"),
+        Key("angular", "non-negative", "against Ω", unit="kg m^2/s", default="0.0"),
+    ),
+)
+
+NEWTONIAN = Section(
+    "[[interaction]]",
+    "Newtonian attraction",
+    (
+        Key(
+            "type",
+            "one of",
+            "towards a point of the world, or between two bodies; a body given by points attracts"
+            " as those, any other one up to its second moments",
+            example='"newtonian"',
+        ),
+        Key("body", "name", "the body attracted"),
+        Key("center", "vector", "the attracting point, in the world", unit="m"),
+        Key("strength", "positive", "G M of the attracting point", unit="m^3/s^2"),
+        Key("other", "name", "instead of center and strength: the other body"),
+        Key("constant", "positive", "G between the two bodies", unit="m^3/(kg s^2)"),
+    ),
+)
+
+DIPOLE = Section(
+    "[[interaction]]",
+    "a magnetic dipole",
+    (
+        Key(
+            "type",
+            "one of",
+            "a dipole of the body in the field of one in the world",
+            example='"dipole"',
+        ),
+        Key("body", "name", "the body that carries it"),
+        Key("at", "vector", "where, in that body's frame", unit="m", default="0"),
+        Key("moment", "vector", "of the body's dipole, in its frame", unit="A m^2"),
+        Key("center", "vector", "where the other dipole is, in the world", unit="m", default="0"),
+        Key("source", "vector", "moment of the other dipole, in the world", unit="A m^2"),
+    ),
+)
+
+INTERACTIONS = {
+    "gravity": GRAVITY,
+    "spring": SPRING,
+    "potential": POTENTIAL,
+    "newtonian": NEWTONIAN,
+    "dipole": DIPOLE,
+    "force": FORCE,
+    "torque": TORQUE,
+    "damping": DAMPING,
+}
 
 TIME = Section(
     "[time]",
@@ -316,13 +490,14 @@ LIMITS = Section(
 
 SECTIONS = (
     SCENE,
-    BODY,
+    GENERAL_BODY,
+    HAMILTONIAN,
+    LAGRANGIAN,
     ORIENTATION,
     MOMENTUM,
     CYLINDER,
     POINT,
-    GRAVITY,
-    SPRING,
+    *INTERACTIONS.values(),
     TIME,
     OUTPUT,
     LIMITS,
@@ -339,7 +514,7 @@ def starter_scene() -> str:
         lines = [section.heading] if section.heading else []
         for key in section.keys:
             nested = section is SCENE and key.kind in ("table", "tables")
-            if not nested and "SE3" in key.groups:
+            if not nested and key.where in (EVERYWHERE, SPATIAL, TRANSLATING):
                 lines += _starter_lines(key)
         blocks.append("\n".join(lines))
     return "\n\n".join(blocks) + "\n"
@@ -366,13 +541,12 @@ def scene_reference() -> str:
             if section.heading in ("", section.what)
             else f"## {title}: {section.what}",
             "",
-            "| key | unit | default | groups | meaning |",
+            "| key | unit | default | on groups | meaning |",
             "|---|---|---|---|---|",
         ]
         for key in section.keys:
-            groups = "" if key.groups == EVERY_GROUP else ", ".join(key.groups)
             default = "" if key.default is None else f"`{key.default}`"
             default = "zero" if key.default == "0" else default
-            rows.append(f"| `{key.name}` | {key.unit} | {default} | {groups} | {key.doc} |")
+            rows.append(f"| `{key.name}` | {key.unit} | {default} | {key.where} | {key.doc} |")
         blocks.append("\n".join(rows))
     return "# The keys of a scene\n\n" + "\n\n".join(blocks) + "\n"

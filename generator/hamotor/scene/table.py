@@ -17,6 +17,8 @@ from hamotor.scene.schema import LARGEST, NAME_PATTERN, Section
 
 LONGEST_TEXT = 200
 LONGEST_NAME = 64
+MOST_EXPRESSION = 10_000
+"""Longer ones are refused by the language itself."""
 
 
 def quoted(text: str) -> str:
@@ -158,7 +160,7 @@ class Table:
 
     def vector(self, name: str) -> Vector:
         """A vector of the space's dimension."""
-        components = "[x, y]" if self.group.dimension == 2 else "[x, y, z]"
+        components = f"[{', '.join('xyzw'[: self.group.dimension])}]"
         return self.numbers(name, self.group.dimension, components)
 
     def rotation(self, name: str) -> Vector:
@@ -173,15 +175,16 @@ class Table:
                 self.fail(f"number {k} must not be negative: {x:g}", name)
         return lengths
 
-    def matrix(self, name: str) -> Matrix:
-        """A 3×3 matrix, rows first."""
+    def matrix(self, name: str, size: int = 3) -> Matrix:
+        """A square matrix, rows first."""
         rows = self._value(name)
         if (
             not isinstance(rows, list)
-            or len(rows) != 3
-            or any(not isinstance(row, list) or len(row) != 3 for row in rows)
+            or len(rows) != size
+            or any(not isinstance(row, list) or len(row) != size for row in rows)
         ):
-            self.fail(f"must be a 3x3 matrix [[..], [..], [..]], not {kind_of(rows)}", name)
+            shown = ", ".join(["[..]"] * size) if size <= 4 else "[..], …"
+            self.fail(f"must be a {size}x{size} matrix [{shown}], not {kind_of(rows)}", name)
         return tuple(
             tuple(
                 self._number(x, f"{name}: row {i}, column {j}") + 0.0 for j, x in enumerate(row, 1)
@@ -199,6 +202,44 @@ class Table:
         if not value.isprintable():
             self.fail(f"must be one printable line, not {quoted(value)}", name)
         return value
+
+    def expression(self, name: str) -> str:
+        """Text in the language of Hamiltonians; line breaks are spaces."""
+        value = self._value(name)
+        if not isinstance(value, str):
+            self.fail(f"must be an expression in quotes, not {kind_of(value)}", name)
+        return " ".join(value.split()) if len(value) <= MOST_EXPRESSION else value
+
+    def parameters(self, name: str) -> dict[str, float | Vector]:
+        """Names with a number or an array of 2 to 4 numbers each."""
+        values = self._value(name)
+        if not isinstance(values, dict):
+            self.fail(f"must be a table of names and numbers, not {kind_of(values)}", name)
+        found: dict[str, float | Vector] = {}
+        for key, value in values.items():
+            if not re.fullmatch(NAME_PATTERN, key) or len(key) > LONGEST_NAME:
+                self.fail(f"{quoted(key)} is not a name: a letter, then letters, digits and _", name)
+            if isinstance(value, list):
+                if not 2 <= len(value) <= 4:
+                    self.fail(f"must have 2 to 4 numbers, not {len(value)}", f"{name}: {key}")
+                found[key] = tuple(self._number(x, f"{name}: {key}") for x in value)
+            else:
+                found[key] = self._number(value, f"{name}: {key}")
+        return found
+
+    def components(self, name: str, allowed: Sequence[str]) -> dict[str, float]:
+        """A table of numbers, each by one of the names in `allowed`."""
+        values = self._value(name)
+        if not isinstance(values, dict):
+            self.fail(f"must be a table of numbers, not {kind_of(values)}", name)
+        for key in values:
+            if key not in allowed:
+                self.fail(
+                    f"unknown component {quoted(key)}; there are {listed(allowed)}."
+                    f"{suggest(key, allowed)}",
+                    name,
+                )
+        return {key: self._number(value, f"{name}: {key}") for key, value in values.items()}
 
     def choice(self, name: str, allowed: Sequence[str], plural: str) -> str:
         """One of the texts in `allowed`."""
