@@ -239,6 +239,11 @@ class Coordinates:
         """Where the body frame's origin is in the world."""
         return self.at((sympy.Integer(0),) * self.dimension)
 
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """Every point asked for so far."""
+        return tuple(self._points.values())
+
     def points_in(self, symbols: set[Expr]) -> tuple[Point, ...]:
         """The points of which a coordinate is among the symbols."""
         return tuple(p for p in self._points.values() if symbols & set(p.symbols))

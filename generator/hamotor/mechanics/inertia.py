@@ -48,9 +48,7 @@ def kinetic_matrix(
             [Fraction(x) for x in velocity],
             [[Fraction(turn[j][k]) + (Fraction(growth) if j == k else 0) for k in d] for j in d],
         )
-        for velocity, turn, growth in zip(
-            space.velocities, space.turns, space.growths, strict=True
-        )
+        for velocity, turn, growth in zip(space.velocities, space.turns, space.growths, strict=True)
     ]
 
     def entry(a: int, b: int) -> Expr:
@@ -58,9 +56,7 @@ def kinetic_matrix(
         total = mass * sum(v[j] * w[j] for j in d)
         total += sum(v[j] * other[j][k] * first[k] for j in d for k in d)
         total += sum(w[j] * turned[j][k] * first[k] for j in d for k in d)
-        total += sum(
-            turned[j][k] * moments[k][n] * other[j][n] for j in d for k in d for n in d
-        )
+        total += sum(turned[j][k] * moments[k][n] * other[j][n] for j in d for k in d for n in d)
         return sympy.Rational(total.numerator, total.denominator)
 
     size = len(fields)

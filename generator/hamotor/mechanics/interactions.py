@@ -114,7 +114,5 @@ def damping_forque(
     """c B_i, with the linear coefficient for translations and the angular one for rotations."""
     return tuple(
         (linear if any(velocity) else angular if any(map(any, turn)) else sympy.Integer(0)) * rate
-        for rate, velocity, turn in zip(
-            rates, body.space.velocities, body.space.turns, strict=True
-        )
+        for rate, velocity, turn in zip(rates, body.space.velocities, body.space.turns, strict=True)
     )

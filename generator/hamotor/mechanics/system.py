@@ -42,25 +42,24 @@ class System:
     @cached_property
     def places(self) -> list[Definition]:
         """Where the bodies are: R, s, x and their points."""
-        found: list[Definition] = []
-        for k, body in enumerate(self.hamiltonian.bodies):
-            found += [
-                (v.symbol, self._name(v.symbol, body, k), v.definition)
-                for v in body.frame_variables
-            ]
-            for point in body.points_in(self._held):
-                definition = body.definition(point)
-                found += [
-                    (symbol, self._name(symbol, body, k), expression)
-                    for symbol, expression in zip(point.symbols, definition, strict=True)
-                ]
-        return found
+        return [
+            stage
+            for k, body in enumerate(self.hamiltonian.bodies)
+            for stage in self.stages_of(body, k)
+        ]
 
-    @cached_property
-    def _held(self) -> set[Expr]:
-        h = self.hamiltonian
-        expressions = [h.energy, *(x for applied in h.applied for x in applied)]
-        return {symbol for expression in expressions for symbol in expression.free_symbols}
+    def stages_of(self, body: Coordinates, k: int) -> list[Definition]:
+        """Where body k is, in the components of its motor."""
+        found: list[Definition] = [
+            (v.symbol, self._name(v.symbol, body, k), v.definition) for v in body.frame_variables
+        ]
+        for point in body.points:
+            definition = body.definition(point)
+            found += [
+                (symbol, self._name(symbol, body, k), expression)
+                for symbol, expression in zip(point.symbols, definition, strict=True)
+            ]
+        return found
 
     @staticmethod
     def _name(symbol: Expr, body: Coordinates, k: int) -> str:
@@ -74,6 +73,10 @@ class System:
         stages = [*self.places, *(between or [])]
         definitions = [(s, name, _folded(x, values)) for s, name, x in stages]
         return straight_line(folded, self.names, definitions)
+
+    def of(self, outputs: Mapping[str, Expr]) -> Program:
+        """A program for other functions of the state and the time."""
+        return self._program(outputs)
 
     @cached_property
     def energy(self) -> Program:

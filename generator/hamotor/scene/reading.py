@@ -14,8 +14,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from hamotor.codegen.spec import bundled_algebras, bundled_path, read_algebra
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
+from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
@@ -41,7 +43,7 @@ def bundled_scenes() -> list[tuple[str, str]]:
     return [(path.stem, read_scene(path).description) for path in sorted(BUNDLED.glob("*.toml"))]
 
 
-def read_scene(scene: str | os.PathLike[str]) -> Scene:
+def read_scene(scene: str | os.PathLike[str]) -> Scene | GeneralScene:
     """The bundled scene of this name, or the scene in the file at this path.
 
     A bundled scene's name comes first; write ./NAME for a file that is called the same. UsageError
@@ -90,14 +92,16 @@ def _contents(path: Path, shown: str, missing: str) -> bytes:
     return contents
 
 
-def parse_scene(contents: bytes, *, name: str, file: str) -> Scene:
+def parse_scene(contents: bytes, *, name: str, file: str) -> Scene | GeneralScene:
     """The scene that a TOML file holds; `file` is how messages call it.
 
     `name` becomes the scene's, with every character that a name cannot have as an underscore.
     """
     values = _toml(contents, file)
     top = Table(file, "", values, schema.SCENE, groups_of(ALGEBRAS[0])[0])
-    algebra = top.choice("algebra", ALGEBRAS, "algebras")
+    algebra = top.choice("algebra", bundled_algebras(), "algebras")
+    if _is_general(top, algebra):
+        return _general(top, algebra, name, contents)
     groups = {group.name: group for group in groups_of(algebra)}
     group = next(iter(groups.values()))
     if top.has("group"):
@@ -121,6 +125,70 @@ def parse_scene(contents: bytes, *, name: str, file: str) -> Scene:
         if not math.isfinite(sum(scene.initial_energy)):
             top.fail("the energy at the start overflows; choose other units or smaller numbers")
     return scene
+
+
+RIGID_INTERACTIONS = ("gravity", "spring")
+
+
+def _is_general(top: Table, algebra: str) -> bool:
+    """Whether the scene needs more than rigid bodies under gravity and springs."""
+    if algebra not in ALGEBRAS or top.has("hamiltonian") or top.has("lagrangian"):
+        return True
+    if top.has("group") and top.values["group"] not in [g.name for g in groups_of(algebra)]:
+        return True
+    acting = top.values.get("interaction", [])
+    kinds = (
+        [x.get("type") for x in acting if isinstance(x, dict)] if isinstance(acting, list) else []
+    )
+    bodies = top.values.get("body", [])
+    new_keys = any(
+        isinstance(body, dict) and {"kinetic_matrix", "motor", "rate", "second_moments"} & set(body)
+        for body in (bodies if isinstance(bodies, list) else [])
+    )
+    return new_keys or any(
+        kind in schema.INTERACTIONS and kind not in RIGID_INTERACTIONS
+        for kind in kinds
+        if isinstance(kind, str)
+    )
+
+
+def _general(top: Table, algebra: str, name: str, contents: bytes) -> GeneralScene:
+    from hamotor.scene.general import group_view
+    from hamotor.scene.general_reading import read_general
+
+    spec = read_algebra(bundled_path(algebra))
+    groups = {group.name: group for group in spec.groups}
+    group = next(iter(groups.values()))
+    if top.has("group"):
+        group = groups[top.choice("group", list(groups), f"groups of {algebra}")]
+    top = Table(top.file, "", top.values, schema.SCENE, group_view(spec.algebra, group))
+    top.refuse_unknown_keys()
+    limits = top.table("limits", schema.LIMITS, heading=True)
+    counted = []
+    for key, what in (("body", "bodies"), ("interaction", "interactions")):
+        tables = top.tables(key) if top.has(key) else []
+        most = limits.integer(what)
+        if len(tables) > most:
+            top.fail(
+                f"{len(tables)} {what} are more than the {most} allowed;"
+                f" allow more with [limits] {what} = {len(tables)}"
+            )
+        counted.append(tables)
+    if not counted[0]:
+        top.fail("a scene needs at least one [[body]]")
+    return read_general(
+        top,
+        name=_identifier(name),
+        algebra=spec.algebra,
+        group=group,
+        contents=contents,
+        bodies=counted[0],
+        acting=counted[1],
+        orientation=_orientation,
+        mass_distribution=_mass_distribution,
+        time=_time(top.table("time", schema.TIME, heading=True)),
+        output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
+    )
 
 
 def _identifier(name: str) -> str:

@@ -235,7 +235,11 @@ GENERAL_BODY = Section(
             active=False,
         ),
         Key(
-            "scale", "positive", "by how much it is enlarged", where=SCALING, default="1.0",
+            "scale",
+            "positive",
+            "by how much it is enlarged",
+            where=SCALING,
+            default="1.0",
             active=False,
         ),
         Key(

@@ -8,6 +8,7 @@ from typing import Any
 
 from hamotor.errors import UsageError, suggest
 from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Body, Scene
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
@@ -18,31 +19,28 @@ SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
 """Masses and moments beyond these have products that overflow in single precision."""
 
 
-def scene_source(scene: Scene, kernels: str = "generated", scalar: str = "double") -> str:
+def scene_source(
+    scene: Scene | GeneralScene, kernels: str = "generated", scalar: str = "double"
+) -> str:
     """The text of the C++ file that defines `scene` over the runtime's headers.
 
     Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
     for numbers that do not fit the scalar.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
     for what, value, allowed in (("kernels", kernels, KERNELS), ("scalar", scalar, tuple(SCALARS))):
         if value not in allowed:
             raise UsageError(
                 f'unknown {what} "{value}"; there is {", ".join(allowed)}.{suggest(value, allowed)}'
             )
+    if not isinstance(scene, Scene):
+        from hamotor.scene.general_source import general_source
+
+        return general_source(scene, kernels, scalar)
     if scalar == "float":
         _refuse_numbers_beyond_float(scene)
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES),
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-        autoescape=False,
-    )
     suffix = SCALARS[scalar]
-    return environment.get_template("scene.cpp.jinja").render(
+    return rendered(
+        "scene.cpp.jinja",
         scene=scene,
         kernels=kernels,
         scalar=scalar.replace("_", " "),
@@ -51,6 +49,21 @@ def scene_source(scene: Scene, kernels: str = "generated", scalar: str = "double
         interactions=_interactions(scene, suffix),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
     )
+
+
+def rendered(template: str, **values: Any) -> str:
+    """The text of a template with these values; a missing value is an error."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+    return environment.get_template(template).render(**values)
 
 
 def _refuse_numbers_beyond_float(scene: Scene) -> None:
@@ -63,7 +76,7 @@ def _refuse_numbers_beyond_float(scene: Scene) -> None:
                 )
 
 
-def _literal(x: float, suffix: str) -> str:
+def literal_text(x: float, suffix: str) -> str:
     """`x` as a C++ literal that reads back exactly; integers stay integers where they are short."""
     if x == int(x) and abs(x) < 1e9:
         return str(int(x))
@@ -71,24 +84,24 @@ def _literal(x: float, suffix: str) -> str:
 
 
 def _literals(numbers: Sequence[float], suffix: str) -> str:
-    return ", ".join(_literal(x, suffix) for x in numbers)
+    return ", ".join(literal_text(x, suffix) for x in numbers)
 
 
-def _text(text: str) -> str:
+def text_literal(text: str) -> str:
     """`text` as a C++ string literal."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
 def _body(body: Body, suffix: str) -> dict[str, Any]:
     frame = body.principal
-    arguments = [_literal(body.mass, suffix), f"{body.name}_moments"]
+    arguments = [literal_text(body.mass, suffix), f"{body.name}_moments"]
     if not body.group.translates:
         center = frame.from_body_frame(body.center_of_mass)
         arguments += [f"{{{_literals(point, suffix)}}}" for point in (center, body.position)]
     return {
         "name": body.name,
         "type": "FreeBody" if body.group.translates else "PivotedBody",
-        "moments": [_literal(x, suffix) for x in frame.moments],
+        "moments": [literal_text(x, suffix) for x in frame.moments],
         "frame": _literals(frame.motor, suffix),
         "arguments": arguments,
     }
@@ -124,8 +137,8 @@ def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
                 "type": kind,
                 "members": [
                     *ends,
-                    f".stiffness = {_literal(spring.stiffness, suffix)}",
-                    f".rest_length = {_literal(spring.rest_length, suffix)}",
+                    f".stiffness = {literal_text(spring.stiffness, suffix)}",
+                    f".rest_length = {literal_text(spring.rest_length, suffix)}",
                 ],
             }
         )
@@ -138,13 +151,13 @@ def _conserved(scene: Scene, quantity: ConservedQuantity) -> dict[str, Any]:
     names = [body.name for body in scene.bodies]
     return {
         "kind": kind,
-        "name": _text(quantity.name),
-        "unit": _text(quantity.unit),
-        "description": _text(quantity.description),
+        "name": text_literal(quantity.name),
+        "unit": text_literal(quantity.unit),
+        "description": text_literal(quantity.description),
         "body": names.index(quantity.body) if quantity.body else 0,
-        "coefficients": [_literal(coefficients.get(g, 0.0), "") for g in scene.group.generators]
+        "coefficients": [literal_text(coefficients.get(g, 0.0), "") for g in scene.group.generators]
         if coefficients
         else [],
-        "norm": [_text(column) for column in quantity.norm],
-        "scale": _literal(quantity.scale, ""),
+        "norm": [text_literal(column) for column in quantity.norm],
+        "scale": literal_text(quantity.scale, ""),
     }

@@ -218,7 +218,9 @@ class Table:
         found: dict[str, float | Vector] = {}
         for key, value in values.items():
             if not re.fullmatch(NAME_PATTERN, key) or len(key) > LONGEST_NAME:
-                self.fail(f"{quoted(key)} is not a name: a letter, then letters, digits and _", name)
+                self.fail(
+                    f"{quoted(key)} is not a name: a letter, then letters, digits and _", name
+                )
             if isinstance(value, list):
                 if not 2 <= len(value) <= 4:
                     self.fail(f"must have 2 to 4 numbers, not {len(value)}", f"{name}: {key}")

@@ -153,6 +153,11 @@ HAMOTOR_FUNCTION(sinh)
 HAMOTOR_FUNCTION(cosh)
 HAMOTOR_FUNCTION(tanh)
 HAMOTOR_FUNCTION(asinh)
+HAMOTOR_FUNCTION(exp)
+HAMOTOR_FUNCTION(log)
+HAMOTOR_FUNCTION(asin)
+HAMOTOR_FUNCTION(acos)
+HAMOTOR_FUNCTION(atan)
 #undef HAMOTOR_FUNCTION
 
 template <class S>
@@ -183,6 +188,11 @@ inline Float128 sinh(const Float128& x) noexcept { return sinhq(x); }
 inline Float128 cosh(const Float128& x) noexcept { return coshq(x); }
 inline Float128 tanh(const Float128& x) noexcept { return tanhq(x); }
 inline Float128 asinh(const Float128& x) noexcept { return asinhq(x); }
+inline Float128 exp(const Float128& x) noexcept { return expq(x); }
+inline Float128 log(const Float128& x) noexcept { return logq(x); }
+inline Float128 asin(const Float128& x) noexcept { return asinq(x); }
+inline Float128 acos(const Float128& x) noexcept { return acosq(x); }
+inline Float128 atan(const Float128& x) noexcept { return atanq(x); }
 inline Float128 atan2(const Float128& y, const Float128& x) noexcept { return atan2q(y, x); }
 inline Float128 fma(const Float128& a, const Float128& b, const Float128& c) noexcept {
   return fmaq(a, b, c);
@@ -214,6 +224,12 @@ template <class S>
   } else {
     return select(x < S(0), -x, x);
   }
+}
+
+/// −1, 0 or 1.
+template <class S>
+[[nodiscard]] constexpr S sign(const S& x) noexcept {
+  return select(x > S(0), S(1), select(x < S(0), S(-1), S(0)));
 }
 
 /// Largest of the absolute values.

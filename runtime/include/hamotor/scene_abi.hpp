@@ -463,6 +463,8 @@ class Run {
     }
     if constexpr (requires { Scene::quantities(state_, time_); }) {
       return Scene::quantities(state_, now())[conserved.index];
+    } else if constexpr (PlacedScene<Scene>) {
+      return std::numeric_limits<S>::quiet_NaN();
     } else {
       return casimir(conserved.quantity, conserved.body);
     }

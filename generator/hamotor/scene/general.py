@@ -1,0 +1,177 @@
+"""Scenes of any Hamiltonian, on any group: what the rigid bodies of `model` do not cover.
+
+A scene is general if it gives `[hamiltonian]` or `[lagrangian]`, lives on a group without rigid
+bodies of its own in the runtime, or has forques that no potential has.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.codegen.algebra import Algebra, reverse_sign
+from hamotor.codegen.group import LieGroup
+from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.exact import decimal
+from hamotor.scene.groups import Group
+from hamotor.scene.model import Output, Time
+from hamotor.scene.motors import Vector
+
+if TYPE_CHECKING:
+    from hamotor.mechanics.coordinates import Coordinates
+    from hamotor.mechanics.hamiltonian import Hamiltonian
+
+Exact = tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class MassDistribution:
+    """Mass and its first two moments, in the body frame; exact."""
+
+    mass: Fraction
+    """kg."""
+    center: Exact
+    """m."""
+    moments: tuple[Exact, ...]
+    """Σ m X Xᵀ about the frame's origin, kg m²."""
+    points: tuple[tuple[Fraction, Exact], ...] = ()
+    """The point masses, where the body was given by points."""
+
+
+@dataclass(frozen=True)
+class GeneralBody:
+    """A body of a general scene: coordinates on the group, and where it starts."""
+
+    name: str
+    coordinates: Coordinates
+    motor: Vector
+    """M at the start, in the order of the group's element."""
+    momentum: Vector
+    """μ at the start, physical, body frame."""
+    mass: MassDistribution | None
+    kinetic_matrix: Any = None
+    """K (SymPy, exact), where the body has a kinetic energy of its own."""
+
+
+@dataclass(frozen=True)
+class GeneralScene:
+    """Bodies on a group, their Hamiltonian, and how to integrate them."""
+
+    name: str
+    description: str
+    algebra: str
+    group: Group
+    bodies: tuple[GeneralBody, ...]
+    hamiltonian: Hamiltonian
+    acting: tuple[str, ...]
+    """What H is made of, a line each, for `hamotor show`."""
+    time: Time
+    output: Output
+    sha256: str
+
+    @cached_property
+    def initial_state(self) -> NDArray[np.float64]:
+        """Per body its motor's and then its momentum's components."""
+        return np.array([x for body in self.bodies for x in (*body.motor, *body.momentum)])
+
+    @cached_property
+    def conserved(self) -> tuple[ConservedQuantity, ...]:
+        """What the exact motion keeps constant."""
+        return tuple(quantity for quantity, _ in self.invariants)
+
+    @cached_property
+    def invariants(self) -> tuple[tuple[ConservedQuantity, Any], ...]:
+        """Each conserved quantity; and what it is over the momenta, if the scene computes it."""
+        from hamotor.scene.invariants import invariants
+
+        return invariants(self)
+
+
+def group_view(algebra: Algebra, group: LieGroup) -> Group:
+    """A group of codegen as scenes see it."""
+    from hamotor.mechanics.coordinates import Space
+
+    space = Space.of(algebra, group)
+    rotations = 0
+    for velocity, turn, growth in zip(space.velocities, space.turns, space.growths, strict=True):
+        if any(velocity) or growth or not any(map(any, turn)):
+            break
+        rotations += 1
+    return Group(
+        name=group.name,
+        algebra=algebra.name,
+        dimension=len(space.directions),
+        motor=tuple(c.name for c in group.element.components),
+        generators=tuple(g.name for g in group.generators),
+        rotations=rotations,
+        scales=space.scales and space.affine,
+    )
+
+
+# ---------------------------------------------------------------- motors
+
+
+def product(algebra: Algebra, a: Mapping[int, float], b: Mapping[int, float]) -> dict[int, float]:
+    """Geometric product of multivectors of floats; each component is summed once."""
+    terms: dict[int, list[float]] = {}
+    for blade_a, x in a.items():
+        for blade_b, y in b.items():
+            for blade, z in algebra.blade_product(blade_a, blade_b).items():
+                terms.setdefault(blade, []).append(x * y * float(z))
+    return {blade: math.fsum(values) for blade, values in terms.items()}
+
+
+def motor_of(
+    coordinates: Coordinates, position: Sequence[float], rotor: Sequence[float], scale: float
+) -> Vector:
+    """M = T(x) R S(s) (theory.md §1); the rotor as (s, e23, e31, e12), in the plane (s, e12)."""
+    algebra, group = coordinates.algebra, coordinates.group
+    space = coordinates.space
+    planes = ("e12",) if len(rotor) == 2 else ("e23", "e31", "e12")
+    turned: dict[int, float] = {0: rotor[0]}
+    for name, x in zip(planes, rotor[1:], strict=True):
+        blade, sign = algebra.parse_blade(name)
+        turned[blade] = sign * x
+    moved: dict[int, float] = {0: 1.0}
+    grown: dict[int, float] = {0: 1.0}
+    for generator, velocity, growth in zip(
+        group.generators, space.velocities, space.growths, strict=True
+    ):
+        for blade, x in generator.bivector.items():
+            for j, v in enumerate(velocity):
+                if v and not growth:
+                    moved[blade] = moved.get(blade, 0.0) + float(x) / float(v) * position[j]
+            if growth and space.affine:
+                # E is ½ e0∧e∞, which squares to ¼: exp(ln s E) = cosh(½ ln s) + 2 E sinh(½ ln s).
+                half = math.log(scale) / (2 * float(growth))
+                grown[0] = math.cosh(half)
+                grown[blade] = 2 * float(x) * math.sinh(half)
+    whole = product(algebra, product(algebra, moved, turned), grown)
+    return tuple(
+        math.fsum(float(x) * whole.get(blade, 0.0) for blade, x in reading.items()) + 0.0
+        for reading in group.element.reading
+    )
+
+
+def unit_deviation(coordinates: Coordinates, motor: Sequence[float]) -> float:
+    """The largest coefficient of M M~ − 1."""
+    whole: dict[int, float] = {}
+    for x, component in zip(motor, coordinates.group.element.components, strict=True):
+        for blade, y in component.embedding.items():
+            whole[blade] = whole.get(blade, 0.0) + x * float(y)
+    back = {blade: reverse_sign(blade) * x for blade, x in whole.items()}
+    square = product(coordinates.algebra, whole, back)
+    square[0] = square.get(0, 0.0) - 1.0
+    return max(abs(x) for x in square.values())
+
+
+def exact(numbers: Sequence[float]) -> Exact:
+    """The decimals that their author wrote."""
+    return tuple(decimal(x) for x in numbers)

@@ -1,0 +1,563 @@
+"""From the tables of a scene file to a `GeneralScene`. Every mistake is one UsageError."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from typing import Any
+
+import sympy
+
+from hamotor.codegen.algebra import Algebra
+from hamotor.codegen.group import LieGroup
+from hamotor.errors import UsageError, suggest
+from hamotor.mechanics import inertia, interactions
+from hamotor.mechanics.coordinates import Coordinates, Expr
+from hamotor.mechanics.hamiltonian import Hamiltonian
+from hamotor.mechanics.language import Vector, read_number, read_vector
+from hamotor.mechanics.numbers import momenta_of_rates
+from hamotor.mechanics.vocabulary import Speaker, vocabulary
+from hamotor.scene import schema
+from hamotor.scene.general import (
+    GeneralBody,
+    GeneralScene,
+    MassDistribution,
+    exact,
+    group_view,
+    motor_of,
+    unit_deviation,
+)
+from hamotor.scene.groups import Group
+from hamotor.scene.model import Output, Time
+from hamotor.scene.table import Table, listed, quoted
+
+UNIT_TOLERANCE = 1e-6
+
+MassReader = Callable[[Table], tuple[float, tuple[float, ...], Any]]
+"""(mass, centre of mass, tensor about it) of a body's table."""
+
+
+@dataclass
+class _Draft:
+    """A body while it is being read."""
+
+    table: Table
+    name: str
+    coordinates: Coordinates
+    motor: tuple[float, ...]
+    mass: MassDistribution | None
+    tensor: Any
+    kinetic_matrix: Any
+
+    @property
+    def kinetic(self) -> Expr | None:
+        if self.kinetic_matrix is None:
+            return None
+        return inertia.kinetic_energy(self.coordinates, self.kinetic_matrix)
+
+
+@dataclass
+class _System:
+    """What acts, while it is being read."""
+
+    drafts: Sequence[_Draft]
+    energy: Expr = field(default_factory=lambda: sympy.Integer(0))
+    parameters: dict[Expr, Expr] = field(default_factory=dict)
+    applied: list[list[Expr]] = field(default_factory=list)
+    acting: list[str] = field(default_factory=list)
+
+    def draft(self, table: Table, key: str = "body") -> _Draft:
+        """The body that a key names."""
+        names = [draft.name for draft in self.drafts]
+        name = table.name(key)
+        if name not in names:
+            table.fail(
+                f"unknown body {quoted(name)}; bodies are {listed(names)}.{suggest(name, names)}"
+            )
+        return self.drafts[names.index(name)]
+
+    def apply(self, draft: _Draft, forque: Sequence[Expr]) -> None:
+        """Add an applied forque."""
+        if not self.applied:
+            self.applied = [[sympy.Integer(0)] * len(d.coordinates.momenta) for d in self.drafts]
+        k = list(self.drafts).index(draft)
+        self.applied[k] = [a + f for a, f in zip(self.applied[k], forque, strict=True)]
+
+
+def read_general(
+    top: Table,
+    *,
+    name: str,
+    algebra: Algebra,
+    group: LieGroup,
+    contents: bytes,
+    bodies: Sequence[Mapping[str, Any]],
+    acting: Sequence[Mapping[str, Any]],
+    orientation: Callable[[Table], tuple[float, ...]],
+    mass_distribution: MassReader,
+    time: Time,
+    output: Output,
+) -> GeneralScene:
+    """The scene; what rigid scenes read in the same way comes as functions of theirs."""
+    view = group_view(algebra, group)
+    drafts = [
+        _draft(
+            top,
+            number,
+            values,
+            len(bodies) > 1,
+            algebra,
+            group,
+            view,
+            orientation,
+            mass_distribution,
+        )
+        for number, values in enumerate(bodies, 1)
+    ]
+    names = [draft.name for draft in drafts]
+    for number, body in enumerate(names, 1):
+        if body in names[: number - 1]:
+            first = names.index(body) + 1
+            top.fail(f'body {number}: name: "{body}" is the name of body {first} already')
+    system = _System(drafts)
+    own = next((key for key in ("hamiltonian", "lagrangian") if top.has(key)), None)
+    if top.has("hamiltonian") and top.has("lagrangian"):
+        top.fail('"hamiltonian" and "lagrangian" contradict each other; give one')
+    if own is None:
+        for draft in drafts:
+            if draft.kinetic is None:
+                draft.table.fail(
+                    'missing "mass" (or "points", or "kinetic_matrix"): without [hamiltonian] or'
+                    " [lagrangian] a body needs a kinetic energy"
+                )
+            system.energy += draft.kinetic
+    elif own == "hamiltonian":
+        _hamiltonian(top.table(own, schema.HAMILTONIAN, heading=True), system)
+    else:
+        _lagrangian(top.table(own, schema.LAGRANGIAN, heading=True), system)
+    for number, values in enumerate(acting, 1):
+        _interaction(top, number, dict(values), view, system)
+    hamiltonian = Hamiltonian(
+        tuple(draft.coordinates for draft in drafts),
+        system.energy,
+        system.parameters,
+        tuple(tuple(forque) for forque in system.applied),
+    )
+    return GeneralScene(
+        name=name,
+        description=top.text("description"),
+        algebra=algebra.name,
+        group=view,
+        bodies=_started(top, drafts, hamiltonian),
+        hamiltonian=hamiltonian,
+        acting=tuple(system.acting),
+        time=time,
+        output=output,
+        sha256=hashlib.sha256(contents).hexdigest(),
+    )
+
+
+def _draft(
+    top: Table,
+    number: int,
+    values: Mapping[str, Any],
+    several: bool,
+    algebra: Algebra,
+    group: LieGroup,
+    view: Group,
+    orientation: Callable[[Table], tuple[float, ...]],
+    mass_distribution: MassReader,
+) -> _Draft:
+    table = Table(top.file, f"body {number}", dict(values), schema.GENERAL_BODY, view)
+    table.refuse_unknown_keys()
+    name = table.name("name")
+    table = Table(table.file, f'body {number} "{name}"', table.values, table.section, view)
+    body = Coordinates(name, algebra, group, prefix=f"{name}." if several else "")
+    mass, tensor = _mass(table, body, mass_distribution)
+    matrix = _kinetic_matrix(table, body, mass)
+    return _Draft(table, name, body, _motor(table, body, orientation), mass, tensor, matrix)
+
+
+SHAPES = ("inertia", "box", "ellipsoid", "cylinder", "disk", "points", "second_moments")
+
+
+def _mass(
+    table: Table, body: Coordinates, mass_distribution: MassReader
+) -> tuple[MassDistribution | None, Any]:
+    if not any(table.has(key) for key in (*SHAPES, "mass")):
+        return None, None
+    if not body.space.affine:
+        table.fail(f"{table.group.name} bends straight lines: a mass has no kinetic energy on it")
+    if table.has("kinetic_matrix"):
+        table.fail('"kinetic_matrix" and "mass" contradict each other; give one')
+    if table.has("second_moments") or table.group.dimension == 4:
+        center = exact(table.vector("center_of_mass"))
+        diagonal = exact(table.lengths("second_moments"))
+        mass = Fraction(*_ratio(table.number("mass")))
+        d = range(len(center))
+        moments = tuple(
+            tuple(mass * center[i] * center[j] + (diagonal[i] if i == j else 0) for j in d)
+            for i in d
+        )
+        return MassDistribution(mass, center, moments), None
+    given, at, tensor = mass_distribution(table)
+    mass, center = Fraction(*_ratio(given)), exact(at)
+    rows = [exact(row) for row in tensor]
+    moments = tuple(tuple(row) for row in inertia.second_moments(mass, center, rows))
+    points: tuple[tuple[Fraction, tuple[Fraction, ...]], ...] = ()
+    if table.has("points"):
+        points = tuple(
+            (Fraction(*_ratio(p["mass"])), exact(p["at"])) for p in table.tables("points")
+        )
+    return MassDistribution(mass, center, moments, points), rows
+
+
+def _ratio(x: float) -> tuple[int, int]:
+    (fraction,) = exact((x,))
+    return fraction.numerator, fraction.denominator
+
+
+def _kinetic_matrix(table: Table, body: Coordinates, mass: MassDistribution | None) -> Any:
+    size = len(body.momenta)
+    if mass is not None:
+        matrix = inertia.kinetic_matrix(body, mass.mass, mass.center, mass.moments)
+        what = "the body's masses"
+    elif table.has("kinetic_matrix"):
+        rows = table.matrix("kinetic_matrix", size)
+        matrix = sympy.Matrix([[_number(x) for x in row] for row in rows])
+        what = "kinetic_matrix"
+        if matrix != matrix.T:
+            table.fail("must be symmetric", "kinetic_matrix")
+    else:
+        return None
+    if not matrix.is_positive_definite:
+        table.fail(f"{what}: the kinetic energy on {table.group.name} is not positive definite")
+    return matrix
+
+
+def _number(x: float) -> Expr:
+    return sympy.Rational(*_ratio(x))
+
+
+def _numbers(values: Sequence[float]) -> tuple[Expr, ...]:
+    return tuple(_number(x) for x in values)
+
+
+def _motor(
+    table: Table, body: Coordinates, orientation: Callable[[Table], tuple[float, ...]]
+) -> tuple[float, ...]:
+    names = table.group.motor
+    if table.has("motor"):
+        for key in ("position", "orientation", "scale"):
+            if table.has(key):
+                table.fail(f'"motor" and "{key}" contradict each other; give one')
+        given = table.components("motor", names)
+        motor = tuple(given.get(name, 0.0) for name in names)
+        if (deviation := unit_deviation(body, motor)) > UNIT_TOLERANCE:
+            table.fail(f"must be unit, but M M~ differs from 1 by {deviation:.3g}", "motor")
+        return motor
+    if table.group.dimension not in (2, 3) or "s" not in names:
+        for key in ("position", "orientation"):
+            if table.has(key):
+                table.fail(f'{table.group.name}: give "motor" instead of "{key}"')
+        return tuple(1.0 if name == "s" else 0.0 for name in names)
+    position = table.vector("position") if table.group.translates else ()
+    scale = table.number("scale") if table.group.scales else 1.0
+    return motor_of(body, position, orientation(table), scale)
+
+
+def _parameters(table: Table, system: _System, reserved: str) -> dict[str, Any]:
+    """Symbols of the table's parameters, their values put into the system."""
+    found: dict[str, Any] = {}
+    for name, value in table.parameters("parameters").items():
+        if isinstance(value, tuple):
+            symbols = tuple(
+                sympy.Symbol(f"{reserved}{name}_{axis}", real=True) for axis in "xyzw"[: len(value)]
+            )
+            system.parameters |= dict(zip(symbols, _numbers(value), strict=True))
+            found[name] = Vector(symbols)
+        else:
+            symbol = sympy.Symbol(reserved + name, real=True)
+            system.parameters[symbol] = _number(value)
+            found[name] = symbol
+    return found
+
+
+def _speakers(system: _System, *, rates: bool, momenta: bool) -> list[Speaker]:
+    speakers = []
+    for draft in system.drafts:
+        derivative = (
+            tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
+            if rates
+            else None
+        )
+        speakers.append(Speaker(draft.coordinates, derivative, momenta, draft.kinetic))
+    return speakers
+
+
+def _hamiltonian(table: Table, system: _System) -> None:
+    text = table.expression("expression")
+    words = _vocabulary(table, _speakers(system, rates=False, momenta=True), system)
+    system.energy += read_number(text, words, f"{table.file}: {table.place}: expression")
+    system.acting.append(f"H = {text}")
+
+
+def _lagrangian(table: Table, system: _System) -> None:
+    table.fail("Lagrangians are not in this version yet; give [hamiltonian]")
+
+
+def _vocabulary(
+    table: Table, speakers: Sequence[Speaker], system: _System, reserved: str = ""
+) -> Any:
+    parameters = _parameters(table, system, reserved)
+    try:
+        return vocabulary(speakers, parameters)
+    except UsageError as error:
+        table.fail(str(error), "parameters")
+
+
+def _interaction(
+    top: Table, number: int, values: dict[str, Any], view: Group, system: _System
+) -> None:
+    place = f"interaction {number}"
+    kinds = tuple(schema.INTERACTIONS)
+    kind = Table(top.file, place, values, schema.GRAVITY, view).choice("type", kinds, "types")
+    table = Table(top.file, place, values, schema.INTERACTIONS[kind], view)
+    table.refuse_unknown_keys()
+    if not system.drafts[0].coordinates.space.affine and kind not in ("potential",):
+        table.fail(f'"{kind}" needs a group that keeps straight lines, not {view.name}')
+    readers = {
+        "gravity": _gravity,
+        "spring": _spring,
+        "potential": _potential,
+        "newtonian": _newtonian,
+        "dipole": _dipole,
+        "force": _force,
+        "torque": _torque,
+        "damping": _damping,
+    }
+    readers[kind](table, system, number)
+
+
+def _gravity(table: Table, system: _System, _number_of: int) -> None:
+    field_ = _numbers(table.vector("acceleration"))
+    for draft in system.drafts:
+        if draft.mass is None:
+            table.fail(f'body "{draft.name}" has no mass for gravity to act on')
+        system.energy += interactions.uniform_gravity(
+            draft.coordinates,
+            _rational(draft.mass.mass),
+            tuple(map(_rational, draft.mass.center)),
+            field_,
+        )
+    system.acting.append(f"gravity {_shown(table.vector('acceleration'))} m/s^2 on every body")
+
+
+def _rational(x: Fraction) -> Expr:
+    return sympy.Rational(x.numerator, x.denominator)
+
+
+def _shown(values: Sequence[float]) -> str:
+    return "(" + ", ".join(f"{x:.6g}" for x in values) + ")"
+
+
+def _spring(table: Table, system: _System, _number_of: int) -> None:
+    draft = system.draft(table)
+    near = draft.coordinates.at(_numbers(table.vector("at")))
+    if table.one_of("anchor", "other") == "anchor":
+        if table.has("other_at"):
+            table.fail('"anchor" and "other_at" contradict each other; "other_at" is for "other"')
+        far: tuple[Expr, ...] = _numbers(table.vector("anchor"))
+        end = f"the point {_shown(table.vector('anchor'))} of the world"
+    else:
+        other = system.draft(table, "other")
+        if other is draft:
+            table.fail(f'"{draft.name}" cannot be tied to itself by a spring', "other")
+        far = other.coordinates.at(_numbers(table.vector("other_at")))
+        end = f"{_shown(table.vector('other_at'))} of {other.name}"
+    stiffness, rest = table.number("stiffness"), table.number("rest_length")
+    system.energy += interactions.spring(near, far, _number(stiffness), _number(rest))
+    system.acting.append(
+        f"spring from {_shown(table.vector('at'))} of {draft.name} to {end}, {stiffness:g} N/m,"
+        f" rest length {rest:g} m"
+    )
+
+
+def _potential(table: Table, system: _System, number: int) -> None:
+    text = table.expression("expression")
+    words = _vocabulary(table, _speakers(system, rates=False, momenta=False), system, f"{number}.")
+    system.energy += read_number(text, words, f"{table.file}: {table.place}: expression")
+    system.acting.append(f"potential {text}")
+
+
+def _newtonian(table: Table, system: _System, _number_of: int) -> None:
+    draft = system.draft(table)
+    if table.one_of("center", "other") == "center":
+        center = _numbers(table.vector("center"))
+        strength = _number(table.number("strength"))
+        system.energy += _attracted(table, draft, center, strength)
+        system.acting.append(
+            f"Newtonian attraction of {draft.name} to {_shown(table.vector('center'))},"
+            f" {table.number('strength'):g} m^3/s^2, {_as(draft)}"
+        )
+        return
+    other = system.draft(table, "other")
+    if other is draft:
+        table.fail(f'"{draft.name}" does not attract itself', "other")
+    constant = _number(table.number("constant"))
+    one, two = _weights(table, draft), _weights(table, other)
+    system.energy += constant * interactions.newtonian_of_points(one, two)
+    system.acting.append(
+        f"Newtonian attraction between {draft.name} and {other.name},"
+        f" G = {table.number('constant'):g} m^3/(kg s^2), point by point"
+    )
+
+
+def _weights(table: Table, draft: _Draft) -> list[tuple[Expr, tuple[Expr, ...]]]:
+    if draft.mass is None:
+        table.fail(f'body "{draft.name}" has no mass to attract or be attracted')
+    points = draft.mass.points or ((draft.mass.mass, draft.mass.center),)
+    return [
+        (_rational(mass), draft.coordinates.at(tuple(map(_rational, at)))) for mass, at in points
+    ]
+
+
+def _as(draft: _Draft) -> str:
+    assert draft.mass is not None
+    return "point by point" if draft.mass.points else "up to second moments"
+
+
+def _attracted(table: Table, draft: _Draft, center: Sequence[Expr], strength: Expr) -> Expr:
+    if draft.mass is None:
+        table.fail(f'body "{draft.name}" has no mass to be attracted')
+    if draft.mass.points or draft.tensor is None or table.group.dimension != 3:
+        weighted = _weights(table, draft)
+        return interactions.newtonian_of_points(weighted, [(strength, tuple(center))])
+    return interactions.newtonian_of_moments(
+        draft.coordinates,
+        _rational(draft.mass.mass),
+        tuple(map(_rational, draft.mass.center)),
+        [tuple(map(_rational, row)) for row in draft.tensor],
+        center,
+        strength,
+    )
+
+
+def _dipole(table: Table, system: _System, _number_of: int) -> None:
+    draft = system.draft(table)
+    vectors = [_numbers(table.vector(key)) for key in ("at", "moment", "center", "source")]
+    system.energy += interactions.dipole(draft.coordinates, *vectors)
+    system.acting.append(
+        f"dipole {_shown(table.vector('moment'))} A m^2 of {draft.name} in the field of"
+        f" {_shown(table.vector('source'))} A m^2 at {_shown(table.vector('center'))}"
+    )
+
+
+def _force(table: Table, system: _System, number: int) -> None:
+    draft = system.draft(table)
+    words = _vocabulary(table, _speakers(system, rates=True, momenta=True), system, f"{number}.")
+    text = table.expression("expression")
+    where = f"{table.file}: {table.place}: expression"
+    force = tuple(read_vector(text, words, where, table.group.dimension))
+    place = _numbers(table.vector("at"))
+    system.apply(draft, interactions.force_forque(draft.coordinates, place, force))
+    system.acting.append(f"force {text} N at {_shown(table.vector('at'))} of {draft.name}")
+
+
+def _torque(table: Table, system: _System, number: int) -> None:
+    draft = system.draft(table)
+    words = _vocabulary(table, _speakers(system, rates=True, momenta=True), system, f"{number}.")
+    text = table.expression("expression")
+    where = f"{table.file}: {table.place}: expression"
+    if table.group.dimension == 2:
+        torque: tuple[Expr, ...] = (read_number(text, words, where),)
+    elif table.group.dimension == 3:
+        torque = tuple(read_vector(text, words, where, 3))
+    else:
+        table.fail("torques are for two and three dimensions")
+    system.apply(draft, interactions.torque_forque(draft.coordinates, torque))
+    system.acting.append(f"torque {text} N m on {draft.name}")
+
+
+def _damping(table: Table, system: _System, _number_of: int) -> None:
+    draft = system.draft(table)
+    linear, angular = table.number("linear"), table.number("angular")
+    rates = tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
+    forque = interactions.damping_forque(
+        draft.coordinates, rates, _number(linear), _number(angular)
+    )
+    system.apply(draft, forque)
+    system.acting.append(
+        f"damping of {draft.name}, {linear:g} kg/s linear, {angular:g} kg m^2/s angular"
+    )
+
+
+def _started(top: Table, drafts: Sequence[_Draft], h: Hamiltonian) -> tuple[GeneralBody, ...]:
+    """The bodies with their momenta: as given, or of the rates that are given."""
+    given = [_momentum(draft) for draft in drafts]
+    rates = [_rates(draft) for draft in drafts]
+    if any(momentum is None for momentum in given):
+        found = momenta_of_rates(h, [draft.motor for draft in drafts], rates)
+        if found is None:
+            top.fail("no momentum has the velocities given: H is not regular there; give momenta")
+        given = [
+            its_own if its_own is not None else of_rates
+            for its_own, of_rates in zip(given, found, strict=True)
+        ]
+    return tuple(
+        GeneralBody(
+            name=draft.name,
+            coordinates=draft.coordinates,
+            motor=draft.motor,
+            momentum=momentum or (),
+            mass=draft.mass,
+            kinetic_matrix=draft.kinetic_matrix,
+        )
+        for draft, momentum in zip(drafts, given, strict=True)
+    )
+
+
+SPEEDS = ("velocity", "angular_velocity")
+
+
+def _momentum(draft: _Draft) -> tuple[float, ...] | None:
+    """μ at the start, if the file gives it."""
+    table = draft.table
+    given = [key for key in ("momentum", "rate", *SPEEDS) if table.has(key)]
+    if len(given) > 1 and given != list(SPEEDS):
+        table.fail(f"{' and '.join(map(quoted, given))} contradict each other; give one")
+    if given != ["momentum"]:
+        return None
+    value = table.values["momentum"]
+    if isinstance(value, dict) and not set(value) <= {"linear", "angular"}:
+        components = table.components("momentum", table.group.generators)
+        return tuple(components.get(name, 0.0) for name in table.group.generators)
+    split = table.table("momentum", schema.MOMENTUM)
+    return _joined(draft, split.rotation("angular"), split, "linear")
+
+
+def _rates(draft: _Draft) -> tuple[float, ...]:
+    """B at the start, zero unless the file gives it."""
+    table = draft.table
+    if table.has("rate"):
+        components = table.components("rate", table.group.generators)
+        return tuple(components.get(name, 0.0) for name in table.group.generators)
+    if any(table.has(key) for key in SPEEDS):
+        return _joined(draft, table.rotation("angular_velocity"), table, "velocity")
+    return (0.0,) * len(draft.coordinates.momenta)
+
+
+def _joined(
+    draft: _Draft, angular: tuple[float, ...], table: Table, linear: str
+) -> tuple[float, ...]:
+    """Rotations and then translations; what else the group has is zero."""
+    group = table.group
+    if group.rotations not in ((1,) if group.dimension == 2 else (3,)):
+        table.fail(
+            f"{group.name}: give the components by generators: {', '.join(group.generators)}"
+        )
+    moving = table.vector(linear) if group.translates else ()
+    numbers = (*angular, *moving)
+    return (*numbers, *(0.0,) * (len(draft.coordinates.momenta) - len(numbers)))

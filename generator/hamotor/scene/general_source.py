@@ -1,0 +1,169 @@
+"""The C++ source of a general scene: its Hamiltonian's programs as a system of the runtime."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from hamotor.codegen import cpp
+from hamotor.codegen.program import Number, Program
+from hamotor.mechanics.straightline import straight_line
+from hamotor.mechanics.system import System
+from hamotor.scene.general import GeneralScene
+from hamotor.scene.source import literal_text, rendered, text_literal
+
+
+@dataclass(frozen=True)
+class _Body:
+    """A program as the template wants it."""
+
+    program: Program
+
+    @property
+    def lines(self) -> list[str]:
+        """Its bindings."""
+        return [
+            f"const S {name} = {cpp.expression_text(expression)};"
+            for name, expression in self.program.bindings
+        ]
+
+    @property
+    def used(self) -> set[str]:
+        """What it reads."""
+        return cpp.used_names(self.program)
+
+    @property
+    def cost(self) -> str:
+        """Its operations."""
+        return str(self.program.cost)
+
+    @property
+    def value(self) -> str:
+        """Its outputs, in order."""
+        return ", ".join(cpp.expression_text(x) for _, x in self.program.outputs)
+
+    def outputs(self, prefix: str, bodies: int) -> list[list[str]]:
+        """The outputs called `prefix0.…`, `prefix1.…`, a list for each body."""
+        return [
+            [
+                cpp.expression_text(x)
+                for name, x in self.program.outputs
+                if name.startswith(f"{prefix}{k}.")
+            ]
+            for k in range(bodies)
+        ]
+
+
+def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
+    """The text of the C++ file that defines `scene` over the runtime's headers."""
+    system = System(scene.hamiltonian)
+    first = scene.bodies[0].coordinates
+    count = len(scene.bodies)
+    gradient = _Body(system.gradient)
+    forques = [x for name, x in system.gradient.outputs if name.startswith("forque")]
+    powered = not scene.hamiltonian.conservative
+    place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
+    names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
+    units = ["m"] * first.dimension
+    if first.space.affine and first.space.scales:
+        place, names, units = [*place, first.scale], [*names, "scale"], [*units, "1"]
+    own = [(q, x) for q, x in scene.invariants if x is not None]
+    return rendered(
+        "general_scene.cpp.jinja",
+        scene=scene,
+        kernels=kernels,
+        scalar=scalar.replace("_", " "),
+        header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
+        algebra=scene.algebra,
+        group=scene.group.name,
+        hamiltonian=_wrapped(str(scene.hamiltonian.energy)),
+        bodies=[text_literal(body.name) for body in scene.bodies],
+        has_forque=any(x != Number(0) for x in forques),
+        energy=_Body(system.energy),
+        gradient={
+            "cost": gradient.cost,
+            "lines": gradient.lines,
+            "used": gradient.used,
+            "rates": gradient.outputs("rate", count),
+            "forques": gradient.outputs("forque", count),
+        },
+        power=_Body(system.power) if powered else None,
+        identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
+        motor_units=[text_literal(_motor_unit(scene, name)) for name in scene.group.motor],
+        momentum_units=[text_literal(unit) for unit in momentum_units(scene)],
+        place_names=[text_literal(name) for name in names],
+        place_units=[text_literal(unit) for unit in units],
+        place=_Body(
+            straight_line(
+                {f"value{k}": x for k, x in enumerate(place)},
+                {
+                    s: f"m0.{c.name}"
+                    for s, c in zip(first.motor, first.group.element.components, strict=True)
+                },
+                system.stages_of(first, 0),
+            )
+        ),
+        scales=len(names) > first.dimension,
+        quantities=_quantities(system, [x for _, x in own]),
+        conserved=[_conserved(scene, q, own) for q, _ in scene.invariants],
+    )
+
+
+def _wrapped(text: str) -> str:
+    """A one-line comment of bearable length."""
+    return text if len(text) <= 400 else f"{text[:397]}..."
+
+
+def _motor_unit(scene: GeneralScene, blade: str) -> str:
+    """Lengths: e0 in a projective algebra, e∞ in a conformal one, where e0 is 1/length."""
+    if scene.algebra.startswith("pga"):
+        return "m" if "0" in blade else "1"
+    if scene.algebra.startswith("cga"):
+        power = ("i" in blade) - ("0" in blade)
+        return {1: "m", 0: "1", -1: "1/m"}[power]
+    return "1"
+
+
+def momentum_units(scene: GeneralScene) -> list[str]:
+    """Of the momentum's components: J s over the unit of the generator's motion."""
+    space = scene.bodies[0].coordinates.space
+    units = []
+    for velocity, turn, growth in zip(space.velocities, space.turns, space.growths, strict=True):
+        moves = any(velocity)
+        turns = growth or any(map(any, turn))
+        units.append("kg m/s" if moves else "kg m^2/s" if turns else "kg m^3/s")
+    return units
+
+
+def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | None:
+    if not expressions:
+        return None
+    body = _Body(system.of({f"value{k}": x for k, x in enumerate(expressions)}))
+    return {
+        "count": len(expressions),
+        "lines": body.lines,
+        "used": body.used,
+        "value": body.value,
+    }
+
+
+def _conserved(scene: GeneralScene, quantity: Any, own: Sequence[Any]) -> dict[str, Any]:
+    coefficients = dict(quantity.coefficients)
+    names = [body.name for body in scene.bodies]
+    indices = [q.name for q, _ in own]
+    is_own = quantity.name in indices
+    kind = "own" if is_own else quantity.name.split(".", 1)[0]
+    return {
+        "kind": kind,
+        "name": text_literal(quantity.name),
+        "unit": text_literal(quantity.unit),
+        "description": text_literal(quantity.description),
+        "body": names.index(quantity.body) if quantity.body else 0,
+        "coefficients": [literal_text(coefficients.get(g, 0.0), "") for g in scene.group.generators]
+        if coefficients
+        else [],
+        "norm": [text_literal(column) for column in quantity.norm],
+        "scale": literal_text(quantity.scale, ""),
+        "index": indices.index(quantity.name) if is_own else 0,
+    }
