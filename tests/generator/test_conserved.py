@@ -8,9 +8,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.rigid import parse_scene, read_scene
 
 from hamotor.mechanics.echelon import null_space
-from hamotor.scene import ConservedQuantity, Gravity, Scene, Spring, parse_scene, read_scene
+from hamotor.scene import ConservedQuantity, Gravity, Scene, Spring
 
 Array = NDArray[np.float64]
 

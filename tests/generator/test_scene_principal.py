@@ -7,8 +7,9 @@ import random
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.rigid import parse_scene, read_scene
 
-from hamotor.scene import inertia, parse_scene, read_scene
+from hamotor.scene import inertia
 from hamotor.scene.motors import Matrix, motor_of, quaternion_of_matrix, rotation_matrix
 from hamotor.scene.principal import PrincipalFrame, principal_axes, principal_frame
 

@@ -9,11 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from tests.rigid import RIGID, parse_scene, read_scene
 
 from hamotor.errors import UsageError
 from hamotor.run.build import compile_scene
 from hamotor.run.library import SceneLibrary
-from hamotor.scene import Scene, bundled_scenes, parse_scene, read_scene, scene_source
+from hamotor.scene import Scene, scene_source
 from hamotor.scene.motors import rotation_matrix
 
 Array = NDArray[np.float64]
@@ -255,7 +256,7 @@ def test_a_compiled_scene_moves_as_newton_and_euler_say(group: str) -> None:
             assert center == pytest.approx(places[k][:d], abs=1e-10)
 
 
-@pytest.mark.parametrize("name", [name for name, _ in bundled_scenes()])
+@pytest.mark.parametrize("name", RIGID)
 def test_a_compiled_scene_conserves_what_it_says(name: str) -> None:
     """And what Python says of the start is what the library observes there."""
     of = read_scene(name)

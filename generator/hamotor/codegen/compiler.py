@@ -13,9 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
-
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from typing import TYPE_CHECKING, Any
 
 from hamotor.codegen import cpp
 from hamotor.codegen.algebra import Algebra, Blade
@@ -25,6 +23,9 @@ from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import library
 from hamotor.codegen.program import Call
 from hamotor.codegen.spec import AlgebraSpec
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
@@ -86,6 +87,8 @@ def _defects(kernels: Sequence[Kernel]) -> list[Element]:
 
 @cache
 def _environment() -> Environment:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # slow to import
+
     return Environment(
         loader=FileSystemLoader(TEMPLATES),
         undefined=StrictUndefined,

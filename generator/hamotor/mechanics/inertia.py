@@ -1,8 +1,8 @@
 """Kinetic energy from a distribution of mass, on any group that acts affinely.
 
-A body of points X (body frame) with masses m moves at ẋ = s R ξ_B(X), ξ_B(X) = Σ B_i ξ_i(X), so that
-T = ½ s² Bᵀ K B with K_ij = Σ m ξ_i(X)·ξ_j(X): the mass, the first and the second moments are all
-that it needs (theory.md §4; with a scale it is the breathing body of §5).
+A body of points X (body frame) with masses m moves at ẋ = s R ξ_B(X), ξ_B(X) = Σ B_i ξ_i(X),
+so that T = ½ s² Bᵀ K B with K_ij = Σ m ξ_i(X)·ξ_j(X): the mass, the first and the second moments
+are all that it needs (theory.md §4; with a scale it is the breathing body of §5).
 """
 
 from __future__ import annotations

@@ -42,6 +42,7 @@ def momenta_of_rates(
     wanted = [mpmath.mpf(x) for rate in rates for x in rate]
     gradient = [rate for body_rates in hamiltonian.rates for rate in body_rates]
     with mpmath.workdps(DIGITS):
+        close = mpmath.mpf(10) ** (8 - DIGITS) * (1 + max(map(abs, wanted)))
         known: dict[Expr, Expr] = {TIME: mpmath.mpf(0)}
         for symbol, value in hamiltonian.parameters.items():
             known[symbol] = mpmath.mpf(value.p) / value.q
@@ -58,9 +59,7 @@ def momenta_of_rates(
             try:
                 value, matrix = slopes(*known.values(), *momenta)
                 miss = mpmath.matrix([b - g for b, g in zip(wanted, value, strict=True)])
-                if max(map(abs, miss)) <= mpmath.mpf(10) ** (8 - DIGITS) * (
-                    1 + max(map(abs, wanted))
-                ):
+                if max(map(abs, miss)) <= close:
                     break
                 step = mpmath.lu_solve(mpmath.matrix(matrix), miss)
             except (ZeroDivisionError, ValueError, TypeError):

@@ -8,11 +8,69 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hamotor.scene import Body, Gravity, Interaction, Scene, Spring
+    from hamotor.scene import Body, GeneralScene, Gravity, Interaction, Scene, Spring
 
 
-def account(scene: Scene) -> str:
+def account(scene: Scene | GeneralScene) -> str:
     """What is modelled, what is left out, what is conserved and how it is integrated."""
+    from hamotor.scene import Scene
+
+    return _rigid(scene) if isinstance(scene, Scene) else _general(scene)
+
+
+def _general(scene: GeneralScene) -> str:
+    from hamotor.mechanics.system import System
+
+    system = System(scene.hamiltonian)
+    blocks = [
+        [f"{scene.name}: {scene.description}" if scene.description else scene.name],
+        [f"group  {scene.group.name} in {scene.group.algebra}, {_state_size(scene)} numbers"],
+    ]
+    for body in scene.bodies:
+        lines = [f"body {body.name}"]
+        if body.mass is not None:
+            lines.append(f"  mass      {float(body.mass.mass):g} kg")
+        motor = zip(scene.group.motor, body.motor, strict=True)
+        momentum = zip(scene.group.generators, body.momentum, strict=True)
+        lines.append(f"  motor     {_named(motor)}")
+        lines.append(f"  momentum  {_named(momentum)}")
+        blocks.append(lines)
+    blocks.append(["acting", *(f"  {line}" for line in scene.acting or ["nothing"])])
+    blocks.append(["conserved", *_conserved(scene)])
+    blocks.append(["left out", *(f"  {line}" for line in _not_in(scene))])
+    cost = [
+        f"  H                {system.energy.cost}",
+        f"  ∂H/∂μ and dH     {system.gradient.cost}",
+    ]
+    if not scene.hamiltonian.conservative:
+        cost.append(f"  power         {system.power.cost}")
+    blocks.append(["cost of an evaluation", *cost])
+    blocks.append(["time", *(f"  {line}" for line in _time(scene))])
+    return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _named(numbers: Iterable[tuple[str, float]]) -> str:
+    shown = [f"{name} {x:.6g}" for name, x in numbers if x]
+    return ", ".join(shown) or "0"
+
+
+def _not_in(scene: GeneralScene) -> list[str]:
+    """What the equations do not hold, so that nothing of it is computed."""
+    h, space = scene.hamiltonian, scene.bodies[0].coordinates.space
+    lines = []
+    if not any(any(forque) for forque in h.all_forques):
+        lines.append("potentials: H does not know where the bodies are")
+    if not h.applied:
+        lines.append("damping, thrust and control: every forque has a potential")
+    if h.autonomous:
+        lines.append("the time: H does not change by itself")
+    if not space.scales:
+        lines.append("dilation")
+    lines.append("contact and friction")
+    return lines
+
+
+def _rigid(scene: Scene) -> str:
     blocks = [
         [f"{scene.name}: {scene.description}" if scene.description else scene.name],
         [f"group  {scene.group.name} in {scene.group.algebra}, {_state_size(scene)} numbers"],
@@ -27,7 +85,7 @@ def account(scene: Scene) -> str:
     return "\n\n".join("\n".join(block) for block in blocks)
 
 
-def _state_size(scene: Scene) -> int:
+def _state_size(scene: Scene | GeneralScene) -> int:
     return len(scene.bodies) * (len(scene.group.motor) + len(scene.group.generators))
 
 
@@ -76,7 +134,7 @@ def _spring(spring: Spring) -> str:
     )
 
 
-def _conserved(scene: Scene) -> list[str]:
+def _conserved(scene: Scene | GeneralScene) -> list[str]:
     width = max(len(quantity.name) for quantity in scene.conserved)
     return [
         f"  {quantity.name.ljust(width)}  {quantity.description} ({quantity.unit})"
@@ -96,7 +154,7 @@ def _left_out(scene: Scene) -> list[str]:
     return lines
 
 
-def _time(scene: Scene) -> list[str]:
+def _time(scene: Scene | GeneralScene) -> list[str]:
     time = scene.time
     lines = [f"end        {time.end:g} s"]
     if time.step is not None:

@@ -21,7 +21,7 @@ from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
 from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, meet_tolerance, plan
 
 if TYPE_CHECKING:
-    from hamotor.scene import Scene
+    from hamotor.scene import GeneralScene, Scene
 
 SCALARS = ("double", "float", "long_double")
 KERNELS = ("generated",)
@@ -53,7 +53,7 @@ class Simulation:
     every: int
     spec_hash: str
     methods: tuple[str, ...] = ()
-    scene: Scene | None = None
+    scene: Scene | GeneralScene | None = None
 
     def compile(
         self,

@@ -1,6 +1,7 @@
 """Scenes: from a TOML file to a typed, checked `Scene`, and to its C++ source."""
 
 from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import GROUPS, Group
 from hamotor.scene.interactions import Gravity, Interaction, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
@@ -14,6 +15,7 @@ __all__ = [
     "METHODS",
     "Body",
     "ConservedQuantity",
+    "GeneralScene",
     "Gravity",
     "Group",
     "Interaction",

@@ -144,15 +144,16 @@ def motor_of(
     for generator, velocity, growth in zip(
         group.generators, space.velocities, space.growths, strict=True
     ):
-        for blade, x in generator.bivector.items():
+        for blade, coefficient in generator.bivector.items():
+            x = float(coefficient)
             for j, v in enumerate(velocity):
                 if v and not growth:
-                    moved[blade] = moved.get(blade, 0.0) + float(x) / float(v) * position[j]
+                    moved[blade] = moved.get(blade, 0.0) + x / float(v) * position[j]
             if growth and space.affine:
                 # E is ½ e0∧e∞, which squares to ¼: exp(ln s E) = cosh(½ ln s) + 2 E sinh(½ ln s).
                 half = math.log(scale) / (2 * float(growth))
                 grown[0] = math.cosh(half)
-                grown[blade] = 2 * float(x) * math.sinh(half)
+                grown[blade] = 2 * x * math.sinh(half)
     whole = product(algebra, product(algebra, moved, turned), grown)
     return tuple(
         math.fsum(float(x) * whole.get(blade, 0.0) for blade, x in reading.items()) + 0.0

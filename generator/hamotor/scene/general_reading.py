@@ -102,20 +102,8 @@ def read_general(
 ) -> GeneralScene:
     """The scene; what rigid scenes read in the same way comes as functions of theirs."""
     view = group_view(algebra, group)
-    drafts = [
-        _draft(
-            top,
-            number,
-            values,
-            len(bodies) > 1,
-            algebra,
-            group,
-            view,
-            orientation,
-            mass_distribution,
-        )
-        for number, values in enumerate(bodies, 1)
-    ]
+    reader = _Reader(algebra, group, view, len(bodies) > 1, orientation, mass_distribution)
+    drafts = [reader.draft(top.file, number, values) for number, values in enumerate(bodies, 1)]
     names = [draft.name for draft in drafts]
     for number, body in enumerate(names, 1):
         if body in names[: number - 1]:
@@ -159,25 +147,30 @@ def read_general(
     )
 
 
-def _draft(
-    top: Table,
-    number: int,
-    values: Mapping[str, Any],
-    several: bool,
-    algebra: Algebra,
-    group: LieGroup,
-    view: Group,
-    orientation: Callable[[Table], tuple[float, ...]],
-    mass_distribution: MassReader,
-) -> _Draft:
-    table = Table(top.file, f"body {number}", dict(values), schema.GENERAL_BODY, view)
-    table.refuse_unknown_keys()
-    name = table.name("name")
-    table = Table(table.file, f'body {number} "{name}"', table.values, table.section, view)
-    body = Coordinates(name, algebra, group, prefix=f"{name}." if several else "")
-    mass, tensor = _mass(table, body, mass_distribution)
-    matrix = _kinetic_matrix(table, body, mass)
-    return _Draft(table, name, body, _motor(table, body, orientation), mass, tensor, matrix)
+@dataclass(frozen=True)
+class _Reader:
+    """What reading a body needs to know of its scene."""
+
+    algebra: Algebra
+    group: LieGroup
+    view: Group
+    several: bool
+    orientation: Callable[[Table], tuple[float, ...]]
+    mass_distribution: MassReader
+
+    def draft(self, file: str, number: int, values: Mapping[str, Any]) -> _Draft:
+        """The body of this table."""
+        table = Table(file, f"body {number}", dict(values), schema.GENERAL_BODY, self.view)
+        table.refuse_unknown_keys()
+        name = table.name("name")
+        table = Table(file, f'body {number} "{name}"', table.values, table.section, self.view)
+        prefix = f"{name}." if self.several else ""
+        body = Coordinates(name, self.algebra, self.group, prefix=prefix)
+        mass, tensor = _mass(table, body, self.mass_distribution)
+        matrix = _kinetic_matrix(table, body, mass)
+        return _Draft(
+            table, name, body, _motor(table, body, self.orientation), mass, tensor, matrix
+        )
 
 
 SHAPES = ("inertia", "box", "ellipsoid", "cylinder", "disk", "points", "second_moments")
@@ -193,6 +186,9 @@ def _mass(
     if table.has("kinetic_matrix"):
         table.fail('"kinetic_matrix" and "mass" contradict each other; give one')
     if table.has("second_moments") or table.group.dimension == 4:
+        for key in SHAPES[:-1]:
+            if table.has(key):
+                table.fail(f'give "second_moments" instead of "{key}"')
         center = exact(table.vector("center_of_mass"))
         diagonal = exact(table.lengths("second_moments"))
         mass = Fraction(*_ratio(table.number("mass")))
@@ -304,7 +300,7 @@ def _hamiltonian(table: Table, system: _System) -> None:
     system.acting.append(f"H = {text}")
 
 
-def _lagrangian(table: Table, system: _System) -> None:
+def _lagrangian(table: Table, _system: _System) -> None:
     table.fail("Lagrangians are not in this version yet; give [hamiltonian]")
 
 
@@ -326,7 +322,7 @@ def _interaction(
     kind = Table(top.file, place, values, schema.GRAVITY, view).choice("type", kinds, "types")
     table = Table(top.file, place, values, schema.INTERACTIONS[kind], view)
     table.refuse_unknown_keys()
-    if not system.drafts[0].coordinates.space.affine and kind not in ("potential",):
+    if not system.drafts[0].coordinates.space.affine and kind != "potential":
         table.fail(f'"{kind}" needs a group that keeps straight lines, not {view.name}')
     readers = {
         "gravity": _gravity,

@@ -90,8 +90,8 @@ SCENE = Section(
             "group",
             "one of",
             "SE3: moves freely in space; SO3: turns about the body frame's origin, a fixed point;"
-            " SE2: moves in the plane; Sim3 (cga3): also grows and shrinks; and every other group of"
-            " the algebra. Left out: the first of the algebra's spec",
+            " SE2: moves in the plane; Sim3 (cga3): also grows and shrinks; and every other group"
+            " of the algebra. Left out: the first of the algebra's spec",
             example='"SE3"',
             active=False,
         ),
@@ -509,12 +509,13 @@ SECTIONS = (
 
 
 WIDTH = 100
+STARTER_SECTIONS = (SCENE, BODY, GRAVITY, SPRING, TIME, OUTPUT, LIMITS)
 
 
 def starter_scene() -> str:
     """A commented scene that runs, with every key of a spatial scene in it."""
     blocks = ["# A scene: bodies and what acts on them. Lines that begin with # are alternatives."]
-    for section in (SCENE, BODY, GRAVITY, SPRING, TIME, OUTPUT, LIMITS):
+    for section in STARTER_SECTIONS:
         lines = [section.heading] if section.heading else []
         for key in section.keys:
             nested = section is SCENE and key.kind in ("table", "tables")
