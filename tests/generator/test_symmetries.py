@@ -9,16 +9,17 @@ import pytest
 import sympy
 from tests.generator.test_conserved import CASES
 from tests.generator.test_mechanics import body_on
+from tests.rigid import RIGID, read_scene
 
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
 from hamotor.mechanics.symmetries import conserved
-from hamotor.scene import Gravity, Scene, bundled_scenes, read_scene
+from hamotor.scene import Gravity, Scene
 from hamotor.scene.exact import decimal
 
 Q = sympy.Rational
 ZERO = sympy.Integer(0)
-SCENES = {name: read_scene(name) for name, _ in bundled_scenes()} | CASES
+SCENES = {name: read_scene(name) for name in RIGID} | CASES
 
 
 def free(body: Coordinates, *inertia: Any) -> Any:

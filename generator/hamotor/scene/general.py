@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.codegen.algebra import Algebra, reverse_sign
-from hamotor.codegen.group import LieGroup
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.exact import decimal
 from hamotor.scene.groups import Group
@@ -92,27 +91,6 @@ class GeneralScene:
         from hamotor.scene.invariants import invariants
 
         return invariants(self)
-
-
-def group_view(algebra: Algebra, group: LieGroup) -> Group:
-    """A group of codegen as scenes see it."""
-    from hamotor.mechanics.coordinates import Space
-
-    space = Space.of(algebra, group)
-    rotations = 0
-    for velocity, turn, growth in zip(space.velocities, space.turns, space.growths, strict=True):
-        if any(velocity) or growth or not any(map(any, turn)):
-            break
-        rotations += 1
-    return Group(
-        name=group.name,
-        algebra=algebra.name,
-        dimension=len(space.directions),
-        motor=tuple(c.name for c in group.element.components),
-        generators=tuple(g.name for g in group.generators),
-        rotations=rotations,
-        scales=space.scales and space.affine,
-    )
 
 
 # ---------------------------------------------------------------- motors

@@ -25,7 +25,6 @@ from hamotor.scene.general import (
     GeneralScene,
     MassDistribution,
     exact,
-    group_view,
     motor_of,
     unit_deviation,
 )
@@ -101,7 +100,7 @@ def read_general(
     output: Output,
 ) -> GeneralScene:
     """The scene; what rigid scenes read in the same way comes as functions of theirs."""
-    view = group_view(algebra, group)
+    view = top.group
     reader = _Reader(algebra, group, view, len(bodies) > 1, orientation, mass_distribution)
     drafts = [reader.draft(top.file, number, values) for number, values in enumerate(bodies, 1)]
     names = [draft.name for draft in drafts]

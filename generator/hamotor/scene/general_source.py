@@ -91,7 +91,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         power=_Body(system.power) if powered else None,
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
         motor_units=[text_literal(_motor_unit(scene, name)) for name in scene.group.motor],
-        momentum_units=[text_literal(unit) for unit in momentum_units(scene)],
+        momentum_units=[text_literal(unit) for unit in scene.group.units],
         place_names=[text_literal(name) for name in names],
         place_units=[text_literal(unit) for unit in units],
         place=_Body(
@@ -123,17 +123,6 @@ def _motor_unit(scene: GeneralScene, blade: str) -> str:
         power = ("i" in blade) - ("0" in blade)
         return {1: "m", 0: "1", -1: "1/m"}[power]
     return "1"
-
-
-def momentum_units(scene: GeneralScene) -> list[str]:
-    """Of the momentum's components: J s over the unit of the generator's motion."""
-    space = scene.bodies[0].coordinates.space
-    units = []
-    for velocity, turn, growth in zip(space.velocities, space.turns, space.growths, strict=True):
-        moves = any(velocity)
-        turns = growth or any(map(any, turn))
-        units.append("kg m/s" if moves else "kg m^2/s" if turns else "kg m^3/s")
-    return units
 
 
 def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | None:

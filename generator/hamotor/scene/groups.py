@@ -34,6 +34,8 @@ class Group:
     special conformal motions."""
     units: tuple[str, ...]
     """Of the momenta, in SI."""
+    scales: bool = False
+    """Whether bodies change their size, and lines stay straight."""
 
     @property
     def translates(self) -> bool:
@@ -43,21 +45,23 @@ class Group:
 
 def groups_in(spec: AlgebraSpec) -> tuple[Group, ...]:
     """The groups of an algebra's spec, bundled or a user's own."""
-    algebra = spec.algebra
-    squares = [algebra.gram[i][i] for i in range(algebra.dimension)]
+    from hamotor.mechanics.space import Space
+
     groups = []
     for group in spec.groups:
+        space = Space.of(spec.algebra, group)
         turning = [unit == "rad/s" for unit in group.rate_units]
         groups.append(
             Group(
                 name=group.name,
                 algebra=spec.name,
-                dimension=sum(square != 0 for square in squares),
+                dimension=len(space.directions),
                 motor=tuple(c.name for c in group.element.components),
                 generators=tuple(g.name for g in group.generators),
                 rotations=[*turning, False].index(False),
                 lengths=group.rate_lengths,
                 units=group.momentum_units,
+                scales=space.scales and space.affine,
             )
         )
     return tuple(groups)

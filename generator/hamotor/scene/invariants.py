@@ -12,21 +12,34 @@ if TYPE_CHECKING:
 
 def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]:
     """Each conserved quantity; and what it is over the momenta, if the scene computes it."""
-    return (_energy(scene),)
+    from hamotor.mechanics.symmetries import Conserved, conserved
 
+    group = scene.group
 
-def _energy(scene: GeneralScene) -> tuple[ConservedQuantity, Any]:
-    conservative = scene.hamiltonian.conservative
-    name = "energy" if conservative else "energy_balance"
-    return (
-        ConservedQuantity(
-            name=name,
-            unit="J",
-            description="H" if conservative else "H less the work of time and of applied forques",
-            coefficients=(),
-            body="",
-            norm=("energy",),
-            scale=0.0,
-        ),
-        None,
+    def norm(quantity: Conserved) -> tuple[str, ...]:
+        if quantity.kind in {"energy", "energy_balance"}:
+            return ("energy",)
+        if quantity.kind == "own":
+            return (quantity.name,)
+        alike = quantity.unit
+        return tuple(
+            f"spatial_momentum.{generator}"
+            for generator, unit in zip(group.generators, group.units, strict=True)
+            if unit == alike
+        )
+
+    return tuple(
+        (
+            ConservedQuantity(
+                name=quantity.name,
+                unit=quantity.unit,
+                description=quantity.description,
+                coefficients=tuple((g, float(x)) for g, x in quantity.coefficients),
+                body=quantity.body,
+                norm=norm(quantity),
+                scale=0.0,
+            ),
+            quantity.expression if quantity.kind == "own" else None,
+        )
+        for quantity in conserved(scene.hamiltonian)
     )

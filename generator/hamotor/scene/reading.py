@@ -14,11 +14,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hamotor.codegen.spec import bundled_algebras, bundled_path, read_algebra
+from hamotor.codegen.spec import bundled_algebra, bundled_algebras
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
 from hamotor.scene.general import GeneralScene
-from hamotor.scene.groups import ALGEBRAS, groups_of
+from hamotor.scene.groups import ALGEBRAS, bundled_groups, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
@@ -153,15 +153,15 @@ def _is_general(top: Table, algebra: str) -> bool:
 
 
 def _general(top: Table, algebra: str, name: str, contents: bytes) -> GeneralScene:
-    from hamotor.scene.general import group_view
     from hamotor.scene.general_reading import read_general
 
-    spec = read_algebra(bundled_path(algebra))
+    spec = bundled_algebra(algebra)
     groups = {group.name: group for group in spec.groups}
-    group = next(iter(groups.values()))
+    chosen = next(iter(groups))
     if top.has("group"):
-        group = groups[top.choice("group", list(groups), f"groups of {algebra}")]
-    top = Table(top.file, "", top.values, schema.SCENE, group_view(spec.algebra, group))
+        chosen = top.choice("group", list(groups), f"groups of {algebra}")
+    view = next(group for group in bundled_groups(algebra) if group.name == chosen)
+    top = Table(top.file, "", top.values, schema.SCENE, view)
     top.refuse_unknown_keys()
     limits = top.table("limits", schema.LIMITS, heading=True)
     counted = []
@@ -180,7 +180,7 @@ def _general(top: Table, algebra: str, name: str, contents: bytes) -> GeneralSce
         top,
         name=_identifier(name),
         algebra=spec.algebra,
-        group=group,
+        group=groups[chosen],
         contents=contents,
         bodies=counted[0],
         acting=counted[1],
