@@ -295,9 +295,12 @@ template <class S>
                                   power_of_two<S>(-shrink / 2), power_of_two<S>(shrink / 2)};
   constexpr Scaling<S> from_small{power_of_two<S>(grow), power_of_two<S>(-grow),
                                   power_of_two<S>(grow / 2), power_of_two<S>(-grow / 2)};
-  if (!(largest > large) && !(largest < small)) [[likely]]
-    return {S(1), S(1), S(1), S(1)};
-  return largest > large ? from_large : from_small;
+  const auto choose = [&](const S& if_large, const S& if_small) {
+    return select(largest > large, if_large, select(largest < small, if_small, S(1)));
+  };
+  return {choose(from_large.in, from_small.in), choose(from_large.out, from_small.out),
+          choose(from_large.root_in, from_small.root_in),
+          choose(from_large.root_out, from_small.root_out)};
 }
 
 /// The rounding error of a product: a b = product + product_error exactly (barring underflow).
