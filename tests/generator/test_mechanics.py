@@ -9,26 +9,14 @@ from typing import Any
 import mpmath
 import pytest
 import sympy
+from tests.generator.hamiltonians import GROUPS, body_on
 
-from hamotor.codegen import bundled_algebras, read_algebra
 from hamotor.codegen.algebra import Algebra
-from hamotor.codegen.spec import bundled_path
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.hamiltonian import Hamiltonian
 from hamotor.mechanics.system import System
 
-GROUPS = [
-    (name, group.name)
-    for name in bundled_algebras()
-    for group in read_algebra(bundled_path(name)).groups
-]
 Multivector = dict[int, Any]
-
-
-def body_on(algebra: str, group: str, name: str = "body", prefix: str = "") -> Coordinates:
-    spec = read_algebra(bundled_path(algebra))
-    found = next(g for g in spec.groups if g.name == group)
-    return Coordinates(name, spec.algebra, found, prefix)
 
 
 def product(algebra: Algebra, a: Multivector, b: Multivector) -> Multivector:

@@ -7,24 +7,16 @@ from typing import Any
 
 import pytest
 import sympy
+from tests.generator.hamiltonians import HAMILTONIANS, ZERO, Q, body_on, free, heavy_top
 from tests.generator.test_conserved import CASES
-from tests.generator.test_mechanics import body_on
 from tests.rigid import RIGID, read_scene
 
-from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
 from hamotor.mechanics.symmetries import conserved
 from hamotor.scene import Gravity, Scene
 from hamotor.scene.exact import decimal
 
-Q = sympy.Rational
-ZERO = sympy.Integer(0)
 SCENES = {name: read_scene(name) for name in RIGID} | CASES
-
-
-def free(body: Coordinates, *inertia: Any) -> Any:
-    """Σ μ_i²/2J_i."""
-    return sum(p**2 / (2 * Q(j)) for p, j in zip(body.momenta, inertia, strict=True))
 
 
 def exact(numbers: Any) -> tuple[Any, ...]:
@@ -82,19 +74,55 @@ def names(hamiltonian: Hamiltonian) -> list[str]:
     return [q.name for q in conserved(hamiltonian)]
 
 
-def top(energy: Any, *inertia: Any) -> Hamiltonian:
-    body = body_on("pga3", "SO3", "top")
-    weight = body.at((ZERO, ZERO, Q("0.05")))[2] if energy else ZERO
-    return Hamiltonian((body,), free(body, *inertia) + energy * weight)
-
-
-def test_a_symmetric_top_keeps_its_spin_and_an_asymmetric_one_does_not() -> None:
-    assert names(top(Q("1.7"), 1, 1, "2.5")) == [
+SE3_MOMENTA = tuple(f"spatial_momentum.{g}" for g in ("e23", "e31", "e12", "e01", "e02", "e03"))
+SIMILARITIES = ("e23", "e31", "e12", "e1i", "e2i", "e3i", "e0i")
+CONSERVED: dict[str, list[str]] = {
+    "symmetric heavy top": ["energy", "spatial_momentum.e12", "top.momentum.e12"],
+    "asymmetric heavy top": ["energy", "spatial_momentum.e12"],
+    "gravity and spring": ["energy", "spatial_momentum.e12_about_axis"],
+    "gravity and spring, conformal": ["energy", "spatial_momentum.e12_about_axis"],
+    "two bodies": ["energy", *SE3_MOMENTA],
+    "Kirchhoff": [
         "energy",
         "spatial_momentum.e12",
-        "top.momentum.e12",
-    ]
-    assert names(top(Q("1.7"), 1, "1.000001", "2.5")) == ["energy", "spatial_momentum.e12"]
+        *SE3_MOMENTA[3:],
+        "hull.casimir.p_squared",
+    ],
+    "dipole": ["energy", "spatial_momentum.e31_combination"],
+    "conformal body": [
+        "energy",
+        *(f"spatial_momentum.{g}" for g in SIMILARITIES),
+        "body.casimir.p_dot_pi_squared_over_p_squared",
+    ],
+    "breathing body": [
+        "energy",
+        "spatial_momentum.e12",
+        "spatial_momentum.e1i",
+        "spatial_momentum.e2i",
+    ],
+    "full conformal in a potential": [
+        "energy",
+        "spatial_momentum.e23_about_axis",
+        "spatial_momentum.e31_about_axis",
+        "spatial_momentum.e12",
+    ],
+    "not quadratic": ["energy_balance"],
+    "damped and driven": ["energy_balance"],
+}
+
+
+@pytest.mark.parametrize("name", CONSERVED)
+def test_conserved_quantities_are_those_of_the_textbook(name: str) -> None:
+    assert names(HAMILTONIANS[name]()) == CONSERVED[name]
+
+
+def test_the_momentum_about_the_axis_of_a_dipole_field_is_kept() -> None:
+    _, about_axis = conserved(HAMILTONIANS["dipole"]())
+    assert about_axis.coefficients == (("e31", Fraction(1)), ("e12", Fraction(10, 3)))
+
+
+def test_a_hair_of_asymmetry_ends_the_spin() -> None:
+    assert names(heavy_top("1", "1.000000000001", "2.5")) == ["energy", "spatial_momentum.e12"]
 
 
 def test_an_axis_of_symmetry_may_lie_anywhere_in_the_body() -> None:

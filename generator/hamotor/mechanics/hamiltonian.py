@@ -147,10 +147,11 @@ class Hamiltonian:
         )
 
     def prove_energy_balance(self) -> None:
-        """Prove dH/dt = `power` along the motion. ValueError if it fails: a defect of ours.
+        """Prove dH/dt = `power`, given that B and F are dH. ValueError if not: a defect of ours.
 
-        With B and F as they are, dH/dt = Σ B_i μ̇_i + F_i B_i + ∂H/∂t; the forques cancel and
-        μ([B, B]) is left, which the structure constants must make vanish.
+        Along the motion dH/dt = Σ B_i μ̇_i + F_b,i B_i + ∂H/∂t. The forques cancel, what is applied
+        stays as `power`, and μ([B, B]) is left, which the structure constants must make vanish.
+        That the programs' B and F are dH is for `proof.prove_energy_balance` to show.
         """
         for body in self.bodies:
             rates = tuple(sympy.Dummy() for _ in body.rates)

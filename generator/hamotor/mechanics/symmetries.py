@@ -23,28 +23,35 @@ found.
 
 from __future__ import annotations
 
-import random
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache, cached_property
+from itertools import islice
 from typing import Any, Literal
 
 import mpmath
 import sympy
 
-from hamotor.codegen.algebra import Algebra, Blade, add_scaled, reverse_sign
+from hamotor.codegen.algebra import Blade, reverse_sign
 from hamotor.codegen.polynomial import Polynomial
 from hamotor.codegen.program import Program
 from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.echelon import null_space
 from hamotor.mechanics.hamiltonian import Hamiltonian
 from hamotor.mechanics.naming import Generators
-from hamotor.mechanics.straightline import FUNCTIONS, straight_line
+from hamotor.mechanics.states import (
+    DIGITS,
+    Number,
+    State,
+    coadjoint,
+    largest,
+    paired,
+    random_states,
+    real,
+)
+from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
 
-DIGITS = 100
 NEGLIGIBLE = mpmath.mpf(10) ** -45
 """Of the size of the forques: less is no condition on a symmetry."""
 AGREEMENT = mpmath.mpf(10) ** -35
@@ -55,8 +62,7 @@ MOST_ATTEMPTS = 20
 MOST_OPERATIONS_PROVED = 2_000
 """A rate of change with more operations is not expanded: that could take longer than the run."""
 
-Number = Any
-"""One of mpmath's numbers: complex where a root is continued beyond its domain."""
+Matrix = list[list[Number]]
 
 
 @dataclass(frozen=True)
@@ -83,13 +89,21 @@ def conserved(hamiltonian: Hamiltonian, system: System | None = None) -> tuple[C
 
     system: the programs of the Hamiltonian, if they are there already.
     """
-    states = _States(system or System(hamiltonian))
     found = [_energy(hamiltonian)]
+    count = len(hamiltonian.group.generators) + 1 + CHECKS
     with mpmath.workdps(DIGITS):
-        found += _spatial_momenta(states)
+        states = list(islice(random_states(system or System(hamiltonian)), count))
+        adjoints = [
+            [
+                _adjoint(body, motor)
+                for body, motor in zip(hamiltonian.bodies, s.motors, strict=True)
+            ]
+            for s in states
+        ]
+        found += _spatial_momenta(hamiltonian, states, adjoints)
         for k in range(len(hamiltonian.bodies)):
-            found += _own_momenta(states, k)
-            found += _casimirs(states, k)
+            found += _own_momenta(hamiltonian, states, k)
+            found += _casimirs(hamiltonian, states, k)
     return tuple(found)
 
 
@@ -101,12 +115,15 @@ def _energy(hamiltonian: Hamiltonian) -> Conserved:
     return Conserved("energy_balance", "J", words, "energy_balance", proved=True)
 
 
-def _spatial_momenta(states: _States) -> list[Conserved]:
-    hamiltonian = states.hamiltonian
+def _spatial_momenta(
+    hamiltonian: Hamiltonian, states: Sequence[State], adjoints: Sequence[Sequence[Matrix]]
+) -> list[Conserved]:
     called = Generators.of(hamiltonian.bodies[0])
     units = dict(zip(called.names, hamiltonian.group.momentum_units, strict=True))
     quantities = []
-    for element in _constants([s.spatial_change for s in states.all]):
+    for element in _constants(
+        [_spatial_change(s, a) for s, a in zip(states, adjoints, strict=True)]
+    ):
         terms = [(g, x) for g, x in zip(called.names, element, strict=True) if x != 0]
         suffix, description = called.reading(element)
         quantities.append(
@@ -130,15 +147,14 @@ def _spatial_momenta(states: _States) -> list[Conserved]:
     return quantities
 
 
-def _own_momenta(states: _States, k: int) -> list[Conserved]:
-    hamiltonian = states.hamiltonian
+def _own_momenta(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> list[Conserved]:
     body = hamiltonian.bodies[k]
     called = Generators.of(body)
     units = dict(zip(called.names, body.group.momentum_units, strict=True))
     alone = len(hamiltonian.bodies) == 1
     quantities = []
-    for element in _constants([s.own_change(k) for s in states.all]):
-        if alone and all(s.leaves(k, element) for s in states.all):
+    for element in _constants([_own_change(body, s, k) for s in states]):
+        if alone and _is_central(body, element):
             continue
         terms = [(g, x) for g, x in zip(called.names, element, strict=True) if x != 0]
         suffix, description = called.reading(element, body.body)
@@ -159,10 +175,10 @@ def _own_momenta(states: _States, k: int) -> list[Conserved]:
     return quantities
 
 
-def _casimirs(states: _States, k: int) -> list[Conserved]:
-    hamiltonian = states.hamiltonian
+def _casimirs(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> list[Conserved]:
     body = hamiltonian.bodies[k]
     momenta = {g.momentum: p for g, p in zip(body.group.generators, body.momenta, strict=True)}
+    names = {p: f"mu{k}.{name}" for name, p in momenta.items()}
     forques = hamiltonian.all_forques[k]
     quantities = []
     for casimir in body.group.casimirs:
@@ -172,8 +188,8 @@ def _casimirs(states: _States, k: int) -> list[Conserved]:
             casimir.denominator, momenta
         )
         slopes = [sympy.diff(expression, p) for p in body.momenta]
-        change = straight_line({str(i): x for i, x in enumerate(slopes)}, states.system.names)
-        if not any(forques) or all(s.casimir_is_constant(k, change) for s in states.all):
+        program = straight_line({str(i): x for i, x in enumerate(slopes)}, names)
+        if not any(forques) or all(_is_level(program, s, k) for s in states):
             quantities.append(
                 Conserved(
                     name=f"{body.body}.casimir.{casimir.name}",
@@ -227,221 +243,60 @@ def _constants(changes: Sequence[tuple[Sequence[Number], Number]]) -> list[list[
 
 def _paired(row: Sequence[Number], element: Sequence[Fraction]) -> Number:
     """row·element, the element taken to have size 1."""
-    return sum(x * y for x, y in zip(row, element, strict=True)) / _mpf(_largest(element))
+    return sum(x * y for x, y in zip(row, element, strict=True)) / real(largest(element))
 
 
 def _recognised(x: Number) -> Fraction:
-    real = mpmath.re(x)
-    mantissa, exponent = real.man_exp
-    exact = Fraction(int(mpmath.sign(real)) * int(mantissa)) * Fraction(2) ** int(exponent)
+    x = mpmath.re(x)
+    mantissa, exponent = x.man_exp
+    exact = Fraction(int(mpmath.sign(x)) * int(mantissa)) * Fraction(2) ** int(exponent)
     simple = exact.limit_denominator(MOST_DENOMINATOR)
     return simple if abs(simple - exact) <= RECOGNISED * max(Fraction(1), abs(exact)) else exact
 
 
-def _mpf(x: Any) -> Number:
-    return mpmath.mpf(x.numerator) / x.denominator
+def _spatial_change(state: State, adjoints: Sequence[Matrix]) -> tuple[list[Number], Number]:
+    """Σ F_s, for each generator of the world F_b of what M~ makes of it; and its terms' size."""
+    change = [
+        sum(
+            x * f
+            for adjoint, forque in zip(adjoints, state.forques, strict=True)
+            for x, f in zip(adjoint[j], forque, strict=True)
+        )
+        for j in range(len(state.forques[0]))
+    ]
+    sizes = (state.size(k) * max(map(largest, adjoint)) for k, adjoint in enumerate(adjoints))
+    return change, max(sizes)
 
 
-@dataclass(frozen=True)
-class _State:
-    """What happens in one state of the system."""
-
-    bodies: tuple[Coordinates, ...]
-    momenta: tuple[list[Number], ...]
-    rates: tuple[list[Number], ...]
-    forques: tuple[list[Number], ...]
-    """F_b, with what is applied."""
-    adjoints: tuple[list[list[Number]], ...]
+def _adjoint(body: Coordinates, motor: Mapping[Blade, Number]) -> Matrix:
     """Row j: M~ E_j M in the generators."""
-
-    def size(self, k: int) -> Number:
-        """How large the terms of body k's μ̇ are."""
-        return max(_largest(self.forques[k]), _largest(self.rates[k]) * _largest(self.momenta[k]))
-
-    @cached_property
-    def spatial_change(self) -> tuple[list[Number], Number]:
-        """Σ F_s: for each generator of the world, F_b of what M~ makes of it."""
-        change = [
-            sum(
-                x * f
-                for adjoint, forque in zip(self.adjoints, self.forques, strict=True)
-                for x, f in zip(adjoint[j], forque, strict=True)
-            )
-            for j in range(len(self.forques[0]))
-        ]
-        size = max(
-            self.size(k) * max(map(_largest, adjoint)) for k, adjoint in enumerate(self.adjoints)
-        )
-        return change, size
-
-    def own_change(self, k: int) -> tuple[list[Number], Number]:
-        """μ̇ of body k."""
-        change = [c - f for c, f in zip(self.coadjoint(k), self.forques[k], strict=True)]
-        return change, self.size(k)
-
-    def coadjoint(self, k: int) -> list[Number]:
-        """ad*_B μ of body k."""
-        structure, rate, momentum = self.bodies[k].group.structure, self.rates[k], self.momenta[k]
-        n = range(len(rate))
-        return [
-            sum(
-                (
-                    _mpf(structure[j][i][m]) * rate[j] * momentum[m]
-                    for j in n
-                    for m in n
-                    if structure[j][i][m]
-                ),
-                mpmath.mpf(0),
-            )
-            for i in n
-        ]
-
-    def leaves(self, k: int, element: Sequence[Fraction]) -> bool:
-        """Whether M~ ζ M = ζ for body k."""
-        moved = [
-            sum(x * y for x, y in zip(element, column, strict=True))
-            for column in zip(*self.adjoints[k], strict=True)
-        ]
-        return bool(_largest(x - _mpf(y) for x, y in zip(moved, element, strict=True)) <= AGREEMENT)
-
-    def casimir_is_constant(self, k: int, slopes: Program) -> bool:
-        """Whether ∂C/∂μ · F_b vanishes for body k."""
-        values = {
-            f"mu{k}.{g.momentum}": p
-            for g, p in zip(self.bodies[k].group.generators, self.momenta[k], strict=True)
-        }
-        found = list(slopes.evaluate(values, _functions(random.Random(0))).values())
-        change = sum(x * f for x, f in zip(found, self.forques[k], strict=True))
-        return bool(abs(change) <= AGREEMENT * _largest(found) * self.size(k))
-
-
-class _States:
-    """Random states of a system, the same ones in every process."""
-
-    def __init__(self, system: System) -> None:
-        self.system = system
-        self.hamiltonian = system.hamiltonian
-        self.random = random.Random(1)
-        self.factors = [mpmath.mpf(1)] * len(self.hamiltonian.bodies)
-
-    @cached_property
-    def all(self) -> list[_State]:
-        """One more than conditions can be independent, then those for verification.
-
-        Momenta are scaled so that ad*_B μ and F are alike in size: neither is to be lost below
-        the other.
-        """
-        first = self._one()
-        for k in range(len(self.factors)):
-            forque = _largest(first.forques[k])
-            turning = _largest(first.rates[k]) * _largest(first.momenta[k])
-            if forque and turning:
-                self.factors[k] = mpmath.sqrt(forque / turning)
-        count = len(self.hamiltonian.bodies[0].momenta) + 1 + CHECKS
-        return [self._one() for _ in range(count)]
-
-    def _one(self) -> _State:
-        for _ in range(MOST_ATTEMPTS):
-            with suppress(ZeroDivisionError, TypeError, ValueError):
-                return self._drawn()
-        raise ValueError("the Hamiltonian has no value in any of the states that were tried")
-
-    def _drawn(self) -> _State:
-        values: dict[str, Number] = {"t": self._number()}
-        momenta, adjoints = [], []
-        for k, body in enumerate(self.hamiltonian.bodies):
-            motor = self._motor(body)
-            momentum = [self.factors[k] * self._number() for _ in body.momenta]
-            components = body.group.element
-            for component, reading in zip(components.components, components.reading, strict=True):
-                values[f"m{k}.{component.name}"] = sum(
-                    (_mpf(x) * motor.get(blade, 0) for blade, x in reading.items()), mpmath.mpf(0)
-                )
-            for generator, p in zip(body.group.generators, momentum, strict=True):
-                values[f"mu{k}.{generator.momentum}"] = p
-            momenta.append(momentum)
-            adjoints.append(_adjoint(body, motor))
-        found = self.system.gradient.evaluate(values, _functions(self.random))
-        generators = self.hamiltonian.group.generators
-        bodies = range(len(self.hamiltonian.bodies))
-        return _State(
-            self.hamiltonian.bodies,
-            tuple(momenta),
-            tuple([found[f"rate{k}.{g.rate}"] for g in generators] for k in bodies),
-            tuple([found[f"forque{k}.{g.momentum}"] for g in generators] for k in bodies),
-            tuple(adjoints),
-        )
-
-    def _number(self) -> Number:
-        return mpmath.mpf(self.random.choice((-1, 1)) * self.random.randint(100, 1000)) / 1009
-
-    def _motor(self, body: Coordinates) -> Any:
-        motor: Any = {0: mpmath.mpf(1)}
-        for generator in body.group.generators:
-            step = _exponential(body.algebra, generator.bivector, self._number())
-            motor = body.algebra.multiply(motor, step)
-        return motor
-
-
-def _exponential(algebra: Algebra, bivector: Mapping[Blade, Any], a: Number) -> Any:
-    """exp of a multiple of a generator: (1 + aE)/√(1 − a²E²) where E² is a number."""
-    step: Any = {blade: a * _mpf(x) for blade, x in bivector.items()}
-    square: Any = algebra.multiply(step, step)
-    if set(square) <= {0}:
-        norm = mpmath.sqrt(1 - square.get(0, 0))
-        return {0: 1 / norm} | {blade: x / norm for blade, x in step.items()}
-    total: Any = {0: mpmath.mpf(1)}
-    term, n = dict(total), 0
-    while max(map(abs, term.values()), default=0) > mpmath.eps:
-        n += 1
-        term = {blade: x / n for blade, x in algebra.multiply(term, step).items()}
-        add_scaled(total, term, 1)
-    return total
-
-
-def _adjoint(body: Coordinates, motor: Mapping[Blade, Number]) -> list[list[Number]]:
-    """M~ E_j M for each generator, in generators."""
-    multiply = body.algebra.multiply
-    reverse = {blade: reverse_sign(blade) * x for blade, x in motor.items()}
+    reverse: Any = {blade: reverse_sign(blade) * x for blade, x in motor.items()}
     rows = []
     for generator in body.group.generators:
-        moved = multiply(multiply(reverse, generator.bivector), motor)
-        rows.append(
-            [
-                sum((_mpf(x) * moved.get(blade, 0) for blade, x in reading.items()), mpmath.mpf(0))
-                for reading in body.group.rate.reading
-            ]
-        )
+        half = body.algebra.multiply(reverse, generator.bivector)
+        moved = body.algebra.multiply(half, motor)
+        rows.append([paired(reading, moved) for reading in body.group.rate.reading])
     return rows
 
 
-def _largest(numbers: Iterable[Number]) -> Number:
-    return max(map(abs, numbers))
+def _own_change(body: Coordinates, state: State, k: int) -> tuple[list[Number], Number]:
+    """μ̇ of body k, and its terms' size."""
+    turning = coadjoint(body, state.rates[k], state.momenta[k])
+    return [c - f for c, f in zip(turning, state.forques[k], strict=True)], state.size(k)
 
 
-def _functions(drawn: random.Random) -> dict[str, Callable[..., Number]]:
-    """What a program may call; each argument of an absolute value gets a sign by lot."""
-    signs: list[tuple[Number, int]] = []
-
-    def sign(x: Number) -> int:
-        for known, chosen in signs:
-            for same in (1, -1):
-                if abs(x - same * known) <= RECOGNISED * abs(known):
-                    return same * chosen
-        signs.append((x, drawn.choice((-1, 1))))
-        return signs[-1][1]
-
-    return {
-        name: getattr(mpmath, name)
-        for name in ("sqrt", *FUNCTIONS.values())
-        if name not in ("abs", "sign")
-    } | {
-        "abs": lambda x: sign(x) * x,
-        "sign": sign,
-        "number": _number,
-    }
+def _is_central(body: Coordinates, element: Sequence[Fraction]) -> bool:
+    """Whether [ζ, E_i] = 0 for all generators."""
+    size = range(len(element))
+    return not any(
+        sum(x * row[i][k] for x, row in zip(element, body.group.structure, strict=True))
+        for i in size
+        for k in size
+    )
 
 
-@cache
-def _number(x: Fraction) -> Number:
-    return _mpf(x)
+def _is_level(slopes: Program, state: State, k: int) -> bool:
+    """Whether ∂C/∂μ · F_b vanishes for body k."""
+    found = list(slopes.evaluate(state.values, state.functions).values())
+    change = sum(x * f for x, f in zip(found, state.forques[k], strict=True))
+    return bool(abs(change) <= AGREEMENT * largest(found) * state.size(k))
