@@ -148,6 +148,29 @@ TYPED_TEST(Group, correction_leaves_the_square_of_the_defect) {
   }
 }
 
+/// Under e0 → −e∞ both have the same coefficients in the same order.
+TEST(RigidMotions, in_conformal_and_projective_algebra_are_the_same_coefficients) {
+  const auto end = [](auto group, int steps) {
+    using G = decltype(group);
+    auto state = start<G>();
+    Rkmk4<Quadratic<G>> method;
+    for (int k = 0; k < steps; ++k) method.do_step(Quadratic<G>{}, state, 0, 0.01);
+    return state;
+  };
+  for (const int steps : {1, 300}) {
+    const auto conformal = end(hamotor::cga3::SE3{}, steps);
+    const auto projective = end(hamotor::pga3::SE3{}, steps);
+    const auto motor = conformal.motors[0].components();
+    const auto momentum = conformal.momenta[0].components();
+    for (std::size_t k = 0; k < motor.size(); ++k) {
+      EXPECT_NEAR(motor[k], projective.motors[0].components()[k], 2e-14);
+    }
+    for (std::size_t k = 0; k < momentum.size(); ++k) {
+      EXPECT_NEAR(momentum[k], projective.momenta[0].components()[k], 2e-14);
+    }
+  }
+}
+
 /// An isotropic oscillator on ℝⁿ, H = |P|²/2m + ½ k |x|².
 template <class G, std::size_t n>
 struct Oscillator {
