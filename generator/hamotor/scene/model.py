@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,9 @@ from hamotor.scene.groups import Group
 from hamotor.scene.interactions import Gravity, Interaction, Spring
 from hamotor.scene.motors import Matrix, Vector, cross, motor_of, rotation_matrix
 from hamotor.scene.principal import PrincipalFrame, principal_frame
+
+if TYPE_CHECKING:
+    from hamotor.mechanics.hamiltonian import Hamiltonian
 
 
 @dataclass(frozen=True)
@@ -142,6 +146,13 @@ class Scene:
     def conserved(self) -> tuple[ConservedQuantity, ...]:
         """What the exact motion keeps constant: energy, momenta by symmetry, Casimirs."""
         return conserved_quantities(self)
+
+    @cached_property
+    def hamiltonian(self) -> Hamiltonian:
+        """H in symbols, over momenta and places in the user's body frames."""
+        from hamotor.scene.hamiltonians import rigid_hamiltonian
+
+        return rigid_hamiltonian(self)
 
     @property
     def gravity(self) -> Vector | None:
