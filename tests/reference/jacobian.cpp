@@ -237,7 +237,10 @@ void go(const char* group, bool measure, std::size_t count, double angle_limit,
         sensitivity<Function>(x.template cast<long double>(), y.template cast<long double>());
     for (const bool turning : {false, true}) {
       const Quad size = length_of(error, turning);
-      const Quad part = scale[turning] * std::numeric_limits<double>::epsilon() +
+      // What is exactly 0 by symmetry the truth has only to its own last place.
+      const Quad around = (1 + length_of(wide_x, true) + (turning ? 0 : length_of(wide_x, false))) *
+                          (length_of(wide_y, true) + (turning ? 0 : length_of(wide_y, false)));
+      const Quad part = scale[turning] * std::numeric_limits<double>::epsilon() + around * 1e-33Q +
                         static_cast<Quad>(std::numeric_limits<double>::min());
       const auto ulp = static_cast<double>(size / part);
       if (std::isnan(ulp)) {

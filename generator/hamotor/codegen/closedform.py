@@ -132,7 +132,12 @@ def one_name(p: Polynomial) -> tuple[int, str]:
 def outputs_for(
     values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
-    """The components of the result, read off blade coefficients."""
+    """The components of the result, read off blade coefficients.
+
+    Raises ValueError where the result has no place for one of them.
+    """
+    if any(blade not in result.blades for blade in values):
+        raise ValueError(f"{result.name} does not hold all grades and blades of the result")
     names: PolynomialMultivector = {b: {(f"{b}",): 1} for b in values}
     outputs: list[tuple[str, Expression]] = []
     for component, p in read_off(names, result).items():

@@ -228,6 +228,21 @@ def without_unused(program: Program) -> Program:
     return Program(program.parameters, tuple(reversed(kept)), program.outputs, program.result)
 
 
+def moved_value(algebra: Algebra, versor: Element, operand: Element) -> PolynomialMultivector:
+    """V X ~V for a unit versor V as exact polynomials, in the grades that X has.
+
+    V ~V = 1 enters as X (1 − V ~V); versors keep grades, so that other grades are 0.
+    """
+    v, x = (value_of(p) for p in parameters_for(versor, operand))
+    product = algebra.geometric
+    both = poly.apply_bilinear(product, poly.apply_bilinear(product, v, x), reversed_value(v))
+    norm = poly.apply_bilinear(product, v, reversed_value(v))
+    sign = -1 if any(g % 2 for g in versor.grades) else 1
+    rest = poly.apply_bilinear(product, x, poly.added({0: ONE}, norm, -1))
+    moved = poly.added(both, rest, sign)
+    return {b: p for b, p in moved.items() if b.bit_count() in operand.grades}
+
+
 def sandwich_kernel(
     algebra: Algebra,
     name: str,

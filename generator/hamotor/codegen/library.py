@@ -7,7 +7,15 @@ from dataclasses import replace
 from math import prod
 
 from hamotor.codegen import closedform, jacobian, lean, nullform, transcendental
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, grade, ratio
+from hamotor.codegen.algebra import (
+    Algebra,
+    Blade,
+    Multivector,
+    Rational,
+    grade,
+    ratio,
+    reverse_sign,
+)
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import (
@@ -15,6 +23,7 @@ from hamotor.codegen.kernel import (
     chain_kernel,
     direct_program,
     linear_kernel,
+    moved_value,
     parameters_for,
     product_kernel,
     proved,
@@ -45,6 +54,12 @@ LAWS = {
 }
 
 
+VERSORS = frozenset(
+    f"{name}{form}" for name in ("exp", "cayley", "normalize", "sqrt") for form in ("", "_lean")
+)
+"""Operations whose results are unit versors."""
+
+
 def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multivector]:
     """The product of basis blades that an operation of two operands extends."""
     products: dict[str, Callable[[Blade, Blade], Multivector]] = {
@@ -63,6 +78,8 @@ def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multi
 def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
     """Every kernel of a spec, in the order of its requests and then of its groups."""
     kernels = [request_kernel(spec, request) for request in stepping_requests(spec)]
+    for kernel in kernels:
+        _check_symbols(spec, kernel)
     for element in {group.element.name: group.element for group in spec.groups}.values():
         kernels += unit_kernels(spec.algebra, element)
     for group in spec.groups:
@@ -72,12 +89,74 @@ def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
 
 def stepping_requests(spec: AlgebraSpec) -> tuple[Request, ...]:
     """The spec's requests, and the product and the reverse of every type that holds a group."""
-    asked = dict.fromkeys(spec.requests)
+    asked = {(r.operation, r.operands, r.grade): r for r in spec.requests}
     for group in spec.groups:
         name = group.element.name
-        asked.setdefault(Request("gp", (name, name), name))
-        asked.setdefault(Request("reverse", (name,), None))
-    return tuple(asked)
+        for request in (Request("gp", (name, name), name), Request("reverse", (name,), None)):
+            asked.setdefault((request.operation, request.operands, None), request)
+    return tuple(asked.values())
+
+
+def _check_symbols(spec: AlgebraSpec, kernel: Kernel) -> None:
+    """Refuse a parameter that is called like one of its kernel's steps."""
+    steps = {name for name, _ in kernel.program.bindings}
+    for parameter in kernel.program.parameters:
+        if parameter.name in steps:
+            raise UsageError(
+                f'{spec.file}: element.{parameter.element.name}: "symbol" = "{parameter.name}" is '
+                f'a step of {kernel.name} already.  Call it "{parameter.name[0]}", for example'
+            )
+
+
+def _keep_promise(
+    algebra: Algebra,
+    value: Mapping[Blade, Polynomial],
+    result: Element,
+    where: str,
+    *,
+    unit: bool,
+) -> None:
+    """Refuse a result type that says more than is true of every value.
+
+    value: what is computed, as polynomials; unit: whether it is always a unit versor.
+    """
+    if not (result.fixed or result.unit):
+        return
+    lost = [b for b in sorted(value) if value[b] and b not in result.blades]
+    wrong = [b for b, x in result.fixed.items() if value.get(b, {}) != {(): x}]
+    reason = ""
+    if lost:
+        names = ", ".join(algebra.blade_name(b) for b in lost)
+        reason = f"does not hold the result's part along {names}"
+    elif wrong:
+        names = ", ".join(algebra.blade_name(b) for b in wrong)
+        reason = f"has a fixed part along {names}, where the result has another"
+    elif result.unit and not unit:
+        reason = "promises V ~V = 1, which the result need not satisfy"
+    if reason:
+        raise UsageError(f"{where}: {result.name} {reason}; name a type that promises less")
+
+
+def _keep_unary_promise(operation: str, operand: Element, result: Element, where: str) -> None:
+    """The same for one operand: versors stay versors, and signs change no fixed part."""
+    signs: dict[str, Callable[[Blade], int]] = {
+        "reverse": reverse_sign,
+        "involute": lambda b: (-1) ** grade(b),
+        "conjugate": lambda b: reverse_sign(b) * (-1) ** grade(b),
+    }
+    sign = signs.get(operation)
+    same = result is operand
+    fixed = same and sign is not None and all(sign(b) > 0 for b in result.fixed)
+    kept = same and (sign is not None or operation == "inverse")
+    for broken, promise in (
+        (bool(result.fixed) and not fixed, "a fixed part"),
+        (result.unit and not kept and operation not in VERSORS, "V ~V = 1"),
+    ):
+        if broken:
+            raise UsageError(
+                f"{where}: {result.name} promises more than {operation} keeps: {promise}; name a "
+                "type that promises less"
+            )
 
 
 def smallest_element(spec: AlgebraSpec, value: Mapping[Blade, object], where: str) -> Element:
@@ -115,6 +194,10 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
                 spec, apply_bilinear(product, value_of(a), value_of(b)), where
             )
         name = request.operation
+        a, b = parameters_for(left, right)
+        value = apply_bilinear(product, value_of(a), value_of(b))
+        unit = name == "gp" and left.unit and right.unit
+        _keep_promise(algebra, value, result, where, unit=unit)
         return product_kernel(algebra, name, LAWS[name], product, left, right, result)
     if request.operation == "sandwich":
         versor, operand = operands
@@ -131,10 +214,20 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
                 "name the type of any weight"
             )
         law = "(−1)^k m x ~m, x of grade k: reflects x in m" if odd else "m x ~m: moves x by m"
-        return sandwich_kernel(algebra, "sandwich", law, versor, operand, result or operand)
+        target = result or operand
+        moved = moved_value(algebra, versor, operand)
+        _keep_promise(algebra, moved, target, where, unit=operand.unit)
+        return sandwich_kernel(algebra, "sandwich", law, versor, operand, target)
     if request.operation == "project":
         return _project(spec, operands, result, where)
-    return _unary_kernel(spec, request, operands[0], result, where)
+    try:
+        kernel = _unary_kernel(spec, request, operands[0], result, where)
+    except ValueError as error:
+        raise UsageError(f'{where}: {error}; name one that does with "-> RESULT"') from error
+    given = kernel.program.result
+    if given is not None and (given.fixed or given.unit):
+        _keep_unary_promise(request.operation, operands[0], given, where)
+    return kernel
 
 
 def _chain(
@@ -158,6 +251,8 @@ def _chain(
     for parameter in parameters[1:]:
         value = apply_bilinear(product, value, value_of(parameter))
     target = result or smallest_element(spec, value, where)
+    unit = request.operation == "gp" and all(e.unit for e in operands)
+    _keep_promise(spec.algebra, value, target, where, unit=unit)
     law = LAWS[request.operation] + "; of all operands from left to right"
     factors = tuple((product, p, value_of(p)) for p in parameters)
     return chain_kernel(spec.algebra, request.operation, law, factors, parameters, target)
@@ -348,6 +443,13 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         ),
         _pairing(group),
     ]
+    m, w = parameters_for(element, rate)
+    velocity = apply_bilinear(algebra.geometric, value_of(m), value_of(w))
+    if lost := [algebra.blade_name(b) for b in sorted(velocity) if b not in element.blades]:
+        raise UsageError(
+            f"{where}: {element.name} does not hold {', '.join(lost)}, which its product with a "
+            "generator has; name an element type that the group stays in"
+        )
     kernels += [jacobian.jacobian_kernel(algebra, group, name, where) for name in group.kernels]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels

@@ -5,13 +5,14 @@ from __future__ import annotations
 import hashlib
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from hamotor.codegen import reserved
 from hamotor.codegen.algebra import Algebra, Blade, Rational, simplest
 from hamotor.codegen.casimir import Casimir, parse_polynomial
 from hamotor.codegen.element import Component, Element, blade_component
@@ -196,6 +197,19 @@ def parse_algebra(text: str, file: str) -> AlgebraSpec:
     return AlgebraSpec(file, description, digest, algebra, elements, groups, requests)
 
 
+def _group_refusal(name: str) -> str:
+    return reserved.group(name, frozenset(OPERATIONS))
+
+
+def _other_name(name: str, refusal: Callable[[str], str]) -> str:
+    """A suggestion near a name that cannot be taken."""
+    plain = "".join(c for c in name if c.isalnum())
+    candidates = (name.capitalize(), plain[:1].upper() + plain[1:], plain.lower(), f"{plain}1")
+    tried = [*candidates, f"{plain.lower()}1", f"{plain.capitalize()}Type"]
+    found = next((c for c in tried if NAME.match(c) and not refusal(c)), "")
+    return f'.  Call it "{found}", for example' if found else ""
+
+
 class _Reader:
     """Turns TOML values into checked ones; every message begins with the file's name."""
 
@@ -247,12 +261,27 @@ class _Reader:
             raise self.fail(
                 where, f'"{key}" must be a text' + ("" if key in table else "; it is missing")
             )
+        if any(ord(c) < 32 for c in value) or value.endswith("\\"):
+            raise self.fail(
+                where,
+                f'"{key}" becomes a line of a C++ comment: line ends, control characters and a '
+                "backslash at its end are not allowed",
+            )
         return value
 
-    def name(self, table: Mapping[str, Any], key: str, where: str) -> str:
+    def name(
+        self,
+        table: Mapping[str, Any],
+        key: str,
+        where: str,
+        refusal: Callable[[str], str] = lambda _: "",
+    ) -> str:
+        """A name that C++ can take; refusal: why it cannot, or nothing."""
         value = self.text(table, key, where)
         if not NAME.match(value):
             raise self.fail(where, f'"{key}" = "{value}" must match [A-Za-z][A-Za-z0-9_]*')
+        if reason := refusal(value):
+            raise self.fail(where, f'"{key}" = "{value}" {reason}{_other_name(value, refusal)}')
         return value
 
     def rational(self, value: Any, where: str) -> Rational:
@@ -276,7 +305,7 @@ class _Reader:
         return value
 
     def algebra(self, data: Mapping[str, Any]) -> Algebra:
-        name = self.name(data, "name", "")
+        name = self.name(data, "name", "", reserved.algebra)
         basis = self.array(data.get("basis"), "basis")
         for vector in basis:
             if not isinstance(vector, str) or not re.fullmatch(r"e[0-9a-z]", vector):
@@ -364,6 +393,8 @@ class _Reader:
             where = f"element.{name}"
             if not NAME.match(name):
                 raise self.fail(where, "must match [A-Za-z][A-Za-z0-9_]*")
+            if reason := reserved.element(name):
+                raise self.fail(where, reason + _other_name(name, reserved.element))
             table = self.table(entry, where)
             self.known_keys(table, ("doc", "symbol", "blades", "unit", "fixed"), where)
             components: list[Component] = []
@@ -371,6 +402,12 @@ class _Reader:
             seen: set[Blade] = set(fixed)
             for text in self.array(table.get("blades"), f"{where}.blades"):
                 blade, _ = self.blade(algebra, text, f"{where}.blades")
+                if text == "1":
+                    raise self.fail(f"{where}.blades", 'the scalar is called "s" here, not "1"')
+                if text in reserved.KEYWORDS:
+                    raise self.fail(
+                        f"{where}.blades", f'"{text}" is a keyword of C++; order it otherwise'
+                    )
                 if blade in seen:
                     raise self.fail(
                         f"{where}.blades", f'"{text}" names a blade that is already there'
@@ -380,7 +417,7 @@ class _Reader:
             unit = table.get("unit", False)
             if not isinstance(unit, bool):
                 raise self.fail(f"{where}.unit", "must be true or false")
-            symbol = self.name(table, "symbol", where)
+            symbol = self.name(table, "symbol", where, reserved.small)
             doc = self.text(table, "doc", where)
             elements[name] = Element(name, symbol, tuple(components), fixed, unit, doc)
         if "Scalar" in elements and elements["Scalar"].blades != (0,):
@@ -393,8 +430,12 @@ class _Reader:
         groups: list[LieGroup] = []
         for index, entry in enumerate(self.array(data.get("group", []), "group"), 1):
             table = self.table(entry, f"group {index}")
-            name = self.name(table, "name", f"group {index}")
+            name = self.name(table, "name", f"group {index}", _group_refusal)
             where = f"group {name}"
+            if name in elements:
+                raise self.fail(where, f"{name} is an element type already")
+            if name.lower() == algebra.name:
+                raise self.fail(where, f"its namespace, {name.lower()}, is the algebra's name")
             keys = ("name", "description", "element", "generators", "casimirs", "kernels", "lean")
             self.known_keys(table, keys, where)
             if any(group.name.lower() == name.lower() for group in groups):
@@ -420,8 +461,8 @@ class _Reader:
                     Generator(
                         generator,
                         bivector,
-                        self.name(one, "rate", f"{where}.{generator}"),
-                        self.name(one, "momentum", f"{where}.{generator}"),
+                        self.name(one, "rate", f"{where}.{generator}", reserved.small),
+                        self.name(one, "momentum", f"{where}.{generator}", reserved.small),
                     )
                 )
             for what in ("name", "rate", "momentum"):
@@ -509,7 +550,7 @@ class _Reader:
                 left, arrow, right = text.partition("->")
                 words = left.split()
                 grade: int | None = None
-                if operation == "grade" and len(words) == 2 and words[1].isdigit():
+                if operation == "grade" and len(words) == 2 and words[1].isdecimal():
                     grade = int(words.pop())
                 wanted = OPERATIONS[operation]
                 fits = len(words) == wanted or (
@@ -532,5 +573,16 @@ class _Reader:
                 request = Request(operation, tuple(words), right.strip() or None, grade)
                 if request in requests:
                     raise self.fail(where, f'"{text}" is listed twice')
+                for other in requests:
+                    if (other.operation, other.operands, other.grade or 0) == (
+                        operation,
+                        request.operands,
+                        grade or 0,
+                    ):
+                        raise self.fail(
+                            where,
+                            f'"{text}" and "{other}" have the same operands, by which alone C++ '
+                            "tells functions apart; leave one out",
+                        )
                 requests.append(request)
         return tuple(requests)

@@ -40,7 +40,7 @@ def standalone_files(spec: AlgebraSpec, spec_text: str) -> tuple[SourceFile, ...
 
 
 def _variable(element: Element) -> str:
-    return element.name.lower()
+    return element.name
 
 
 def _element(element: Element) -> dict[str, Any]:

@@ -153,7 +153,12 @@ def _coefficients(
 def outputs_for(
     values: Mapping[Blade, Expression], result: Element
 ) -> tuple[tuple[str, Expression], ...]:
-    """Read the components of the result off named blade coefficients."""
+    """Read the components of the result off named blade coefficients.
+
+    Raises ValueError where the result has no place for one of them.
+    """
+    if any(blade not in result.blades for blade in values):
+        raise ValueError(f"{result.name} does not hold all grades and blades of the result")
     names: PolynomialMultivector = {b: {(f"#{b}",): 1} for b in values}
     outputs: list[tuple[str, Expression]] = []
     for component, p in read_off(names, result).items():

@@ -92,7 +92,8 @@ struct Space<pga3::SE3> {
   template <class S>
   [[nodiscard]] static constexpr pga3::Motor<S> translation_change(
       const pga3::Motor<S>& m, const std::array<S, 3>& d) noexcept {
-    return gp(m, pga3::IdealLine<S>{S(-0.5) * d[0], S(-0.5) * d[1], S(-0.5) * d[2]});
+    const pga3::IdealLine<S> half{S(-0.5) * d[0], S(-0.5) * d[1], S(-0.5) * d[2]};
+    return pga3::Motor<S>::from(gp(m, half).components());
   }
 
   /// M q − M.
@@ -154,7 +155,8 @@ struct Space<pga2::SE2> {
   template <class S>
   [[nodiscard]] static constexpr pga2::Motor<S> translation_change(
       const pga2::Motor<S>& m, const std::array<S, 2>& d) noexcept {
-    return gp(m, pga2::Direction<S>{S(0.5) * d[1], S(-0.5) * d[0]});
+    return pga2::Motor<S>::from(
+        gp(m, pga2::Direction<S>{S(0.5) * d[1], S(-0.5) * d[0]}).components());
   }
 
   /// M q − M.
