@@ -11,6 +11,7 @@ from hamotor.codegen import bundled_algebras, read_algebra
 from hamotor.codegen.spec import bundled_path
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
+from hamotor.scene import bundled_scenes, read_scene
 
 Q = sympy.Rational
 ZERO = sympy.Integer(0)
@@ -148,6 +149,7 @@ def of_group(algebra: str, group: str) -> Hamiltonian:
 
 HAMILTONIANS: dict[str, Callable[[], Hamiltonian]] = {
     **{f"free {a} {g}": lambda a=a, g=g: of_group(a, g) for a, g in GROUPS},  # type: ignore[misc]
+    **{f"scene {n}": lambda n=n: read_scene(n).hamiltonian for n, _ in bundled_scenes()},  # type: ignore[misc]
     "symmetric heavy top": lambda: heavy_top("0.2", "0.2", "0.1"),
     "asymmetric heavy top": lambda: heavy_top("0.2", "0.3", "0.1"),
     "gravity and spring": lambda: gravity_and_spring("pga3"),

@@ -16,6 +16,9 @@ from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
 from hamotor.mechanics.proof import applied, prove_energy_balance, slopes
 from hamotor.mechanics.states import State, exponential, largest, random_states
 from hamotor.mechanics.system import System
+from hamotor.scene import parse_scene
+from hamotor.scene.general import GeneralScene
+from hamotor.scene.general_source import general_source
 
 OPEN = {"damped and driven", "not quadratic"}
 """Those that time or something applied does work on."""
@@ -165,3 +168,18 @@ def test_programs_of_another_hamiltonian_are_refused(
     prove_energy_balance(System(Hamiltonian((body,), energy)))
     with pytest.raises(ValueError, match=message):
         prove_energy_balance(System(defect((body,), energy)))
+
+
+def test_a_scene_whose_programs_are_wrong_is_not_compiled() -> None:
+    text = (
+        b'algebra = "pga3"\n[[body]]\nname = "a"\nmass = 2\ninertia = [1, 2, 2.5]\n'
+        b'[hamiltonian]\nexpression = "kinetic + k * position.x^2"\nparameters = { k = 3 }\n'
+        b"[time]\nend = 1\nstep = 0.1\n"
+    )
+    scene = parse_scene(text, name="test", file="test.toml")
+    assert isinstance(scene, GeneralScene)
+    assert "rate" in general_source(scene, "generated", "double")
+    h = scene.hamiltonian
+    wrong = dataclasses.replace(scene, hamiltonian=Fast(h.bodies, h.energy, h.parameters))
+    with pytest.raises(ValueError, match="rate of a, component 0"):
+        general_source(wrong, "generated", "double")

@@ -6,7 +6,14 @@ from fractions import Fraction
 
 import pytest
 import sympy
-from tests.generator.hamiltonians import HAMILTONIANS, ZERO, Q, body_on, free, heavy_top
+from tests.generator.hamiltonians import (
+    HAMILTONIANS,
+    ZERO,
+    Q,
+    body_on,
+    free,
+    heavy_top,
+)
 from tests.generator.test_conserved import CASES
 from tests.rigid import RIGID, read_scene
 

@@ -26,6 +26,7 @@ from hamotor.scene.motors import Vector
 if TYPE_CHECKING:
     from hamotor.mechanics.coordinates import Coordinates
     from hamotor.mechanics.hamiltonian import Hamiltonian
+    from hamotor.mechanics.system import System
 
 Exact = tuple[Fraction, ...]
 
@@ -79,6 +80,13 @@ class GeneralScene:
     def initial_state(self) -> NDArray[np.float64]:
         """Per body its motor's and then its momentum's components."""
         return np.array([x for body in self.bodies for x in (*body.motor, *body.momentum)])
+
+    @cached_property
+    def system(self) -> System:
+        """The programs of the Hamiltonian."""
+        from hamotor.mechanics.system import System
+
+        return System(self.hamiltonian)
 
     @cached_property
     def conserved(self) -> tuple[ConservedQuantity, ...]:

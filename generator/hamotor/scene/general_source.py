@@ -8,6 +8,7 @@ from typing import Any
 
 from hamotor.codegen import cpp
 from hamotor.codegen.program import Number, Program
+from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
 from hamotor.scene.general import GeneralScene
@@ -56,8 +57,12 @@ class _Body:
 
 
 def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
-    """The text of the C++ file that defines `scene` over the runtime's headers."""
-    system = System(scene.hamiltonian)
+    """The text of the C++ file that defines `scene` over the runtime's headers.
+
+    ValueError if its programs are not those of its Hamiltonian: a defect of ours.
+    """
+    system = scene.system
+    prove_energy_balance(system)
     first = scene.bodies[0].coordinates
     count = len(scene.bodies)
     gradient = _Body(system.gradient)

@@ -41,5 +41,5 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
             ),
             quantity.expression if quantity.kind == "own" else None,
         )
-        for quantity in conserved(scene.hamiltonian)
+        for quantity in conserved(scene.hamiltonian, scene.system)
     )
