@@ -723,19 +723,17 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 33 mul, 19 add (15 fused), 2 div, 2 sqrt.
+/// Cost: 26 mul, 16 add (12 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e012i = dot(m.e012i, shifted, -m.e0i, m.e12, m.e02, m.e1i, -m.e01, m.e2i);
-  const S square = dot(shifted, shifted, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2),
-                       dot(m.e01, m.e1i, m.e02, m.e2i));
-  const S omega = q_e012i * q_e012i;
-  const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e012i;
+  const S shifted = select(
+      m.s > S(0), S(1) + m.s,
+      dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
+          (S(1) - m.s));
+  const S radius = scalar::sqrt(dot(m.e012i, m.e012i, shifted, shifted));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S turn = S(0.5) * -m.e012i / radius / root;
   return {.s = dot(factor, shifted, turn, -m.e012i),
           .e12 = dot(factor, m.e12, turn, m.e0i),
           .e1i = dot(factor, m.e1i, turn, m.e2i),
@@ -749,18 +747,15 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 24 mul, 13 add (10 fused), 2 div, 2 sqrt.
+/// Cost: 19 mul, 12 add (9 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e012i = dot(m.e012i, shifted, -m.e0i, m.e12);
-  const S square = dot(shifted, shifted, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i);
-  const S omega = q_e012i * q_e012i;
-  const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e012i;
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i) / (S(1) - m.s));
+  const S radius = scalar::sqrt(dot(m.e012i, m.e012i, shifted, shifted));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S turn = S(0.5) * -m.e012i / radius / root;
   return {.s = dot(factor, shifted, turn, -m.e012i),
           .e12 = dot(factor, m.e12, turn, m.e0i),
           .e1i = dot(factor, m.e1i, turn, m.e2i),
@@ -772,12 +767,11 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 6 mul, 2 add (1 fused), 1 div, 1 sqrt.
+/// Cost: 6 mul, 2 add, 2 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S square = dot(shifted, shifted, m.e12, m.e12);
-  const S root = scalar::sqrt(square);
+  const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
+  const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
   return {
       .s = factor * shifted, .e12 = factor * m.e12, .e1i = factor * m.e1i, .e2i = factor * m.e2i};
@@ -850,12 +844,15 @@ template <class S>
 /// cayley_inverse: Versor -> Bivector
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 21 mul, 8 add (7 fused), 1 div.
+/// Cost: 27 mul, 13 add (10 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
-  const S rest = S(1) + m.s;
-  const S inverse = S(1) / dot(m.e012i, m.e012i, rest, rest);
-  const S linear = rest * inverse;
+[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
+  const S shifted = select(
+      m.s > S(0), S(1) + m.s,
+      dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
+          (S(1) - m.s));
+  const S inverse = S(1) / dot(m.e012i, m.e012i, shifted, shifted);
+  const S linear = shifted * inverse;
   return {.e12 = dot(linear, m.e12, inverse, -m.e012i * m.e0i),
           .e1i = dot(linear, m.e1i, inverse, -m.e012i * m.e2i),
           .e2i = dot(linear, m.e2i, inverse, m.e012i * m.e1i),
@@ -866,7 +863,7 @@ template <class S>
 
 /// normalize: Versor -> Versor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 33 mul, 18 add (15 fused), 2 div, 2 sqrt.
+/// Cost: 32 mul, 18 add (15 fused), 2 div, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> normalize(const Versor<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12, m.e02, m.e1i, -m.e01, m.e2i);
@@ -876,8 +873,7 @@ template <class S>
   const S radius = scalar::sqrt(dot(S(4), omega, square, square));
   const S root = scalar::sqrt(S(0.5) * (square + radius));
   const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e012i;
+  const S turn = -q_e012i / (root * radius);
   return {.s = dot(factor, m.s, turn, -m.e012i),
           .e12 = dot(factor, m.e12, turn, m.e0i),
           .e1i = dot(factor, m.e1i, turn, m.e2i),
@@ -890,7 +886,7 @@ template <class S>
 
 /// normalize: Similarity -> Similarity
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 24 mul, 12 add (10 fused), 2 div, 2 sqrt.
+/// Cost: 23 mul, 12 add (10 fused), 2 div, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> normalize(const Similarity<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12);
@@ -899,8 +895,7 @@ template <class S>
   const S radius = scalar::sqrt(dot(S(4), omega, square, square));
   const S root = scalar::sqrt(S(0.5) * (square + radius));
   const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e012i;
+  const S turn = -q_e012i / (root * radius);
   return {.s = dot(factor, m.s, turn, -m.e012i),
           .e12 = dot(factor, m.e12, turn, m.e0i),
           .e1i = dot(factor, m.e1i, turn, m.e2i),

@@ -1917,16 +1917,14 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 22 mul, 11 add (8 fused), 2 div, 1 sqrt.
+/// Cost: 18 mul, 8 add (6 fused), 4 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e123i = dot(m.e123i, shifted, -m.e1i, m.e23, -m.e2i, m.e31, -m.e12, m.e3i);
-  const S square = dot(shifted, shifted, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
-  const S root = scalar::sqrt(square);
-  const S factor = root / square;
-  const S slip = S(-1) / (root * square);
-  const S turn = slip * q_e123i;
+  const S shifted =
+      select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
+  const S root = scalar::sqrt(S(2) * shifted);
+  const S factor = S(0.5) * (root / shifted);
+  const S turn = S(0.5) * -m.e123i / shifted / root;
   return {.s = factor * shifted,
           .e23 = factor * m.e23,
           .e31 = factor * m.e31,
@@ -1940,120 +1938,82 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 103 mul, 72 add (61 fused), 2 div, 2 sqrt.
+/// Cost: 68 mul, 44 add (39 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e012i = dot(m.e012i, shifted, m.e031i, m.e23, -m.e023i, m.e31, -m.e0i, m.e12);
-  const S q_e013i = dot(-m.e031i, shifted, m.e012i, m.e23, m.e0i, m.e31, -m.e023i, m.e12);
-  const S q_e023i = dot(m.e023i, shifted, -m.e0i, m.e23, m.e012i, m.e31, -m.e031i, m.e12);
-  const S q_e123i = dot(m.e123i, shifted, -m.e1i, m.e23, -m.e2i, m.e31, -m.e12, m.e3i, m.e023i,
-                        m.e1i, m.e031i, m.e2i, m.e012i, m.e3i, -m.e0i, m.e123i);
-  const S square = dot(shifted, shifted, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i,
-                       -m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i);
-  const S omega = dot(q_e012i, q_e012i, q_e013i, q_e013i, q_e023i, q_e023i);
-  const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i,
+                               m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) /
+                               (S(1) - m.s));
+  const S radius = scalar::sqrt(
+      mul_add(shifted, shifted, -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i)));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S slip = S(-0.5) / radius / root;
   return {
-      .s = dot(factor, shifted, slip, dot(-m.e023i, q_e023i, m.e031i, q_e013i, -m.e012i, q_e012i)),
-      .e23 = dot(factor, m.e23, slip, dot(m.e0i, q_e023i, -m.e031i, q_e012i, -m.e012i, q_e013i)),
-      .e31 = -dot(factor, -m.e31, slip, dot(m.e0i, q_e013i, -m.e023i, q_e012i, m.e012i, q_e023i)),
-      .e12 = dot(factor, m.e12, slip, dot(m.e0i, q_e012i, m.e023i, q_e013i, m.e031i, q_e023i)),
-      .e1i = dot(factor, m.e1i, slip,
-                 dot(-m.e23, q_e123i, m.e2i, q_e012i, m.e3i, q_e013i, m.e123i, q_e023i, -m.e023i,
-                     q_e123i)),
-      .e2i = dot(factor, m.e2i, slip,
-                 dot(-m.e31, q_e123i, -m.e1i, q_e012i, m.e3i, q_e023i, -m.e123i, q_e013i, -m.e031i,
-                     q_e123i)),
-      .e3i = dot(factor, m.e3i, slip,
-                 dot(-m.e12, q_e123i, -m.e1i, q_e013i, -m.e2i, q_e023i, m.e123i, q_e012i, -m.e012i,
-                     q_e123i)),
+      .s = dot(factor, shifted, slip, dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i)),
+      .e23 = dot(factor, m.e23, slip, m.e023i * m.e0i),
+      .e31 = -dot(factor, -m.e31, slip, -m.e031i * m.e0i),
+      .e12 = dot(factor, m.e12, slip, m.e012i * m.e0i),
+      .e1i = dot(factor, m.e1i, slip, dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i)),
+      .e2i = dot(factor, m.e2i, slip, dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i)),
+      .e3i = dot(factor, m.e3i, slip, dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i)),
       .e123i = dot(
           factor, m.e123i, slip,
-          dot(q_e123i, shifted, -m.e1i, q_e023i, m.e2i, q_e013i, -m.e3i, q_e012i, m.e0i, q_e123i)),
-      .e0i = dot(factor, m.e0i, slip, dot(-m.e23, q_e023i, m.e31, q_e013i, -m.e12, q_e012i)),
-      .e023i = dot(factor, m.e023i, slip, dot(q_e023i, shifted, -m.e31, q_e012i, -m.e12, q_e013i)),
-      .e031i = -dot(factor, -m.e031i, slip, dot(q_e013i, shifted, -m.e23, q_e012i, m.e12, q_e023i)),
-      .e012i = dot(factor, m.e012i, slip, dot(q_e012i, shifted, m.e23, q_e013i, m.e31, q_e023i))};
+          dot(m.e123i, shifted, -m.e023i, m.e1i, -m.e031i, m.e2i, -m.e012i, m.e3i, m.e0i, m.e123i)),
+      .e0i = dot(factor, m.e0i, slip, dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12)),
+      .e023i = dot(factor, m.e023i, slip, dot(m.e023i, shifted, -m.e012i, m.e31, m.e031i, m.e12)),
+      .e031i =
+          -dot(factor, -m.e031i, slip, dot(-m.e031i, shifted, -m.e012i, m.e23, m.e023i, m.e12)),
+      .e012i = dot(factor, m.e012i, slip, dot(m.e012i, shifted, -m.e031i, m.e23, m.e023i, m.e31))};
 }
 
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 174 mul, 132 add (106 fused), 2 div, 2 sqrt.
+/// Cost: 111 mul, 76 add (64 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e0123 = dot(m.e0123, shifted, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12, m.e0123,
-                        m.e0i, -m.e01, m.e023i, -m.e02, m.e031i, -m.e012i, m.e03);
-  const S q_e012i = dot(m.e012i, shifted, m.e031i, m.e23, -m.e023i, m.e31, -m.e0i, m.e12, m.e02,
-                        m.e1i, -m.e01, m.e2i, m.e0123, m.e3i, -m.e03, m.e123i);
-  const S q_e013i = dot(-m.e031i, shifted, m.e012i, m.e23, m.e0i, m.e31, -m.e023i, m.e12, m.e03,
-                        m.e1i, -m.e0123, m.e2i, -m.e01, m.e3i, m.e02, m.e123i);
-  const S q_e023i = dot(m.e023i, shifted, -m.e0i, m.e23, m.e012i, m.e31, -m.e031i, m.e12, m.e0123,
-                        m.e1i, m.e03, m.e2i, -m.e02, m.e3i, -m.e01, m.e123i);
-  const S q_e123i = dot(m.e123i, shifted, -m.e1i, m.e23, -m.e2i, m.e31, -m.e12, m.e3i, m.e023i,
-                        m.e1i, m.e031i, m.e2i, m.e012i, m.e3i, -m.e0i, m.e123i);
-  const S square = dot(shifted, shifted, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i,
-                       -m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2),
-                       dot(m.e01, m.e1i, m.e02, m.e2i, m.e03, m.e3i, m.e0123, m.e123i));
-  const S omega =
-      dot(-q_e012i, q_e012i, -q_e013i, q_e013i, -q_e023i, q_e023i, S(2), q_e0123 * q_e123i);
-  const S radius = scalar::sqrt(mul_add(square, square, -(S(4) * omega)));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i,
+                               m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2),
+                               dot(m.e01, m.e1i, m.e02, m.e2i, m.e03, m.e3i, m.e0123, m.e123i)) /
+                               (S(1) - m.s));
+  const S radius = scalar::sqrt(mul_add(
+      shifted, shifted,
+      -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i)));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S slip = S(-0.5) / radius / root;
   return {
-      .s = dot(factor, shifted, slip,
-               dot(m.e123i, q_e0123, -m.e023i, q_e023i, m.e031i, q_e013i, -m.e012i, q_e012i,
-                   m.e0123, q_e123i)),
-      .e23 = dot(factor, m.e23, slip,
-                 dot(-m.e1i, q_e0123, m.e0i, q_e023i, -m.e031i, q_e012i, -m.e012i, q_e013i, -m.e01,
-                     q_e123i)),
-      .e31 = -dot(
-          factor, -m.e31, slip,
-          dot(m.e2i, q_e0123, m.e0i, q_e013i, -m.e023i, q_e012i, m.e012i, q_e023i, m.e02, q_e123i)),
-      .e12 = dot(factor, m.e12, slip,
-                 dot(-m.e3i, q_e0123, m.e0i, q_e012i, m.e023i, q_e013i, m.e031i, q_e023i, -m.e03,
-                     q_e123i)),
-      .e1i = dot(factor, m.e1i, slip,
-                 dot(-m.e23, q_e123i, m.e2i, q_e012i, m.e3i, q_e013i, m.e123i, q_e023i, -m.e023i,
-                     q_e123i)),
-      .e2i = dot(factor, m.e2i, slip,
-                 dot(-m.e31, q_e123i, -m.e1i, q_e012i, m.e3i, q_e023i, -m.e123i, q_e013i, -m.e031i,
-                     q_e123i)),
-      .e3i = dot(factor, m.e3i, slip,
-                 dot(-m.e12, q_e123i, -m.e1i, q_e013i, -m.e2i, q_e023i, m.e123i, q_e012i, -m.e012i,
-                     q_e123i)),
+      .s = dot(
+          factor, shifted, slip,
+          dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i)),
+      .e23 = dot(factor, m.e23, slip, dot(-m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i)),
+      .e31 = -dot(factor, -m.e31, slip, dot(m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i)),
+      .e12 = dot(factor, m.e12, slip, dot(-m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i)),
+      .e1i = dot(factor, m.e1i, slip, dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i)),
+      .e2i = dot(factor, m.e2i, slip, dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i)),
+      .e3i = dot(factor, m.e3i, slip, dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i)),
       .e123i = dot(
           factor, m.e123i, slip,
-          dot(q_e123i, shifted, -m.e1i, q_e023i, m.e2i, q_e013i, -m.e3i, q_e012i, m.e0i, q_e123i)),
-      .e0i = dot(factor, m.e0i, slip,
-                 dot(-m.e23, q_e023i, m.e31, q_e013i, -m.e12, q_e012i, m.e123i, q_e0123, -m.e0123,
-                     q_e123i)),
+          dot(m.e123i, shifted, -m.e023i, m.e1i, -m.e031i, m.e2i, -m.e012i, m.e3i, m.e0i, m.e123i)),
+      .e0i = dot(factor, m.e0i, slip, dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12)),
       .e023i = dot(
           factor, m.e023i, slip,
-          dot(q_e023i, shifted, -m.e31, q_e012i, -m.e12, q_e013i, -m.e1i, q_e0123, m.e01, q_e123i)),
+          dot(m.e023i, shifted, -m.e012i, m.e31, m.e031i, m.e12, -m.e0123, m.e1i, m.e01, m.e123i)),
       .e031i = -dot(
           factor, -m.e031i, slip,
-          dot(q_e013i, shifted, -m.e23, q_e012i, m.e12, q_e023i, m.e2i, q_e0123, -m.e02, q_e123i)),
+          dot(-m.e031i, shifted, -m.e012i, m.e23, m.e023i, m.e12, m.e0123, m.e2i, -m.e02, m.e123i)),
       .e012i = dot(
           factor, m.e012i, slip,
-          dot(q_e012i, shifted, m.e23, q_e013i, m.e31, q_e023i, -m.e3i, q_e0123, m.e03, q_e123i)),
-      .e01 = dot(factor, m.e01, slip,
-                 dot(-m.e23, q_e0123, m.e023i, q_e0123, -m.e02, q_e012i, -m.e03, q_e013i, -m.e0123,
-                     q_e023i)),
-      .e02 = dot(factor, m.e02, slip,
-                 dot(-m.e31, q_e0123, m.e031i, q_e0123, m.e01, q_e012i, -m.e03, q_e023i, m.e0123,
-                     q_e013i)),
-      .e03 = dot(factor, m.e03, slip,
-                 dot(-m.e12, q_e0123, m.e012i, q_e0123, m.e01, q_e013i, m.e02, q_e023i, -m.e0123,
-                     q_e012i)),
+          dot(m.e012i, shifted, -m.e031i, m.e23, m.e023i, m.e31, -m.e0123, m.e3i, m.e03, m.e123i)),
+      .e01 = dot(factor, m.e01, slip, dot(-m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i)),
+      .e02 = dot(factor, m.e02, slip, dot(-m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03)),
+      .e03 = dot(factor, m.e03, slip, dot(-m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i)),
       .e0123 = dot(
           factor, m.e0123, slip,
-          dot(q_e0123, shifted, -m.e0i, q_e0123, m.e01, q_e023i, -m.e02, q_e013i, m.e03, q_e012i))};
+          dot(m.e0123, shifted, -m.e0123, m.e0i, m.e01, m.e023i, m.e02, m.e031i, m.e012i, m.e03))};
 }
 
 /// exp: Bivector -> Versor
@@ -2275,14 +2235,18 @@ template <class S>
 /// cayley_inverse: Versor -> Bivector
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 57 mul, 35 add (33 fused), 1 div.
+/// Cost: 69 mul, 46 add (41 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
-  const S rest = S(1) + m.s;
-  const S inverse = S(1) / mul_add(rest, rest,
+[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i,
+                               m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2),
+                               dot(m.e01, m.e1i, m.e02, m.e2i, m.e03, m.e3i, m.e0123, m.e123i)) /
+                               (S(1) - m.s));
+  const S inverse = S(1) / mul_add(shifted, shifted,
                                    -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i,
                                         S(2), m.e0123 * m.e123i));
-  const S linear = rest * inverse;
+  const S linear = shifted * inverse;
   return {
       .e23 = dot(linear, m.e23, inverse, dot(m.e0123, m.e1i, -m.e023i, m.e0i, m.e01, m.e123i)),
       .e31 = -dot(linear, -m.e31, inverse, dot(-m.e0123, m.e2i, m.e031i, m.e0i, -m.e02, m.e123i)),

@@ -522,12 +522,11 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 6 mul, 2 add (1 fused), 1 div, 1 sqrt.
+/// Cost: 6 mul, 2 add, 2 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S square = dot(shifted, shifted, m.e12, m.e12);
-  const S root = scalar::sqrt(square);
+  const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
+  const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
   return {
       .s = factor * shifted, .e12 = factor * m.e12, .e01 = factor * m.e01, .e02 = factor * m.e02};
@@ -665,11 +664,11 @@ template <class S>
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
-/// Cost: 3 mul, 1 add, 1 div.
+/// Cost: 4 mul, 2 add, 2 div, 1 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
-  const S rest = S(1) + m.s;
-  const S linear = S(1) / rest;
+[[nodiscard]] constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+  const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
+  const S linear = S(1) / shifted;
   return {.e12 = linear * m.e12, .e01 = linear * m.e01, .e02 = linear * m.e02};
 }
 

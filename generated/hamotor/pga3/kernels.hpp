@@ -1166,16 +1166,14 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 22 mul, 11 add (8 fused), 2 div, 1 sqrt.
+/// Cost: 18 mul, 8 add (6 fused), 4 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e0123 = dot(m.e0123, shifted, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12);
-  const S square = dot(shifted, shifted, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
-  const S root = scalar::sqrt(square);
-  const S factor = root / square;
-  const S slip = S(-1) / (root * square);
-  const S turn = slip * q_e0123;
+  const S shifted =
+      select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
+  const S root = scalar::sqrt(S(2) * shifted);
+  const S factor = S(0.5) * (root / shifted);
+  const S turn = S(0.5) * -m.e0123 / shifted / root;
   return {.s = factor * shifted,
           .e23 = factor * m.e23,
           .e31 = factor * m.e31,
@@ -1189,12 +1187,12 @@ template <class S>
 /// sqrt: Rotor -> Rotor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 8 mul, 4 add (2 fused), 1 div, 1 sqrt.
+/// Cost: 8 mul, 4 add (2 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
-  const S shifted = S(1) + r.s;
-  const S square = dot(shifted, shifted, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12);
-  const S root = scalar::sqrt(square);
+  const S shifted =
+      select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
+  const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
   return {
       .s = factor * shifted, .e23 = factor * r.e23, .e31 = factor * r.e31, .e12 = factor * r.e12};
@@ -1443,11 +1441,12 @@ template <class S>
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
-/// Cost: 13 mul, 4 add (3 fused), 1 div.
+/// Cost: 16 mul, 7 add (5 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
-  const S rest = S(1) + m.s;
-  const S linear = S(1) / rest;
+[[nodiscard]] constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+  const S shifted =
+      select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
+  const S linear = S(1) / shifted;
   const S inverse = linear * linear;
   return {.e23 = linear * m.e23,
           .e31 = linear * m.e31,
@@ -1510,15 +1509,14 @@ template <class S>
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Lean: error at most 4 ulp of the result's norm, measured.  Squares of coordinates must
 /// neither overflow nor vanish.
-/// Cost: 22 mul, 10 add (8 fused), 2 div, 1 sqrt.
+/// Cost: 21 mul, 10 add (8 fused), 2 div, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> normalize_lean(const Motor<S>& m) noexcept {
   const S q_e0123 = dot(m.e0123, m.s, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12);
   const S square = dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
   const S root = scalar::sqrt(square);
   const S factor = root / square;
-  const S slip = S(-1) / (root * square);
-  const S turn = slip * q_e0123;
+  const S turn = -q_e0123 / (root * square);
   return {.s = factor * m.s,
           .e23 = factor * m.e23,
           .e31 = factor * m.e31,

@@ -1008,77 +1008,58 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 129 mul, 89 add (73 fused), 2 div, 2 sqrt.
+/// Cost: 82 mul, 50 add (42 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = S(1) + m.s;
-  const S q_e0123 = dot(m.e0123, shifted, -m.e03, m.e12, m.e02, m.e13, -m.e0234, m.e14, -m.e01,
-                        m.e23, m.e0134, m.e24, -m.e0124, m.e34, m.e04, m.e1234);
-  const S q_e0124 = dot(m.e0124, shifted, -m.e04, m.e12, m.e0234, m.e13, m.e02, m.e14, -m.e0134,
-                        m.e23, -m.e01, m.e24, m.e0123, m.e34, -m.e03, m.e1234);
-  const S q_e0134 = dot(m.e0134, shifted, -m.e0234, m.e12, -m.e04, m.e13, m.e03, m.e14, m.e0124,
-                        m.e23, -m.e0123, m.e24, -m.e01, m.e34, m.e02, m.e1234);
-  const S q_e0234 = dot(m.e0234, shifted, m.e0134, m.e12, -m.e0124, m.e13, m.e0123, m.e14, -m.e04,
-                        m.e23, m.e03, m.e24, -m.e02, m.e34, -m.e01, m.e1234);
-  const S q_e1234 = dot(m.e1234, shifted, -m.e12, m.e34, m.e13, m.e24, -m.e14, m.e23);
-  const S square = dot(shifted, shifted, m.e12, m.e12, m.e13, m.e13, m.e14, m.e14, m.e23, m.e23,
-                       m.e24, m.e24, m.e34, m.e34, m.e1234, m.e1234);
-  const S omega = q_e1234 * q_e1234;
-  const S radius = scalar::sqrt(mul_add(square, square, -(S(4) * omega)));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e12, m.e12, m.e13, m.e13, m.e14, m.e14, m.e23, m.e23, m.e24, m.e24,
+                               m.e34, m.e34, m.e1234, m.e1234) /
+                               (S(1) - m.s));
+  const S radius = scalar::sqrt(mul_add(shifted, shifted, -(m.e1234 * m.e1234)));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S slip = S(-0.5) / radius / root;
   return {
-      .s = dot(factor, shifted, slip, m.e1234 * q_e1234),
-      .e12 = dot(factor, m.e12, slip, -m.e34 * q_e1234),
-      .e13 = dot(factor, m.e13, slip, m.e24 * q_e1234),
-      .e14 = dot(factor, m.e14, slip, -m.e23 * q_e1234),
-      .e23 = dot(factor, m.e23, slip, -m.e14 * q_e1234),
-      .e24 = dot(factor, m.e24, slip, m.e13 * q_e1234),
-      .e34 = dot(factor, m.e34, slip, -m.e12 * q_e1234),
-      .e01 = dot(factor, m.e01, slip,
-                 dot(-m.e23, q_e0123, -m.e24, q_e0124, -m.e34, q_e0134, -m.e1234, q_e0234, m.e0234,
-                     q_e1234)),
-      .e02 = dot(factor, m.e02, slip,
-                 dot(m.e13, q_e0123, m.e14, q_e0124, -m.e34, q_e0234, m.e1234, q_e0134, -m.e0134,
-                     q_e1234)),
-      .e03 = dot(factor, m.e03, slip,
-                 dot(-m.e12, q_e0123, m.e14, q_e0134, m.e24, q_e0234, -m.e1234, q_e0124, m.e0124,
-                     q_e1234)),
-      .e04 = dot(factor, m.e04, slip,
-                 dot(-m.e12, q_e0124, -m.e13, q_e0134, -m.e23, q_e0234, m.e1234, q_e0123, -m.e0123,
-                     q_e1234)),
-      .e1234 = dot(factor, m.e1234, slip, q_e1234 * shifted),
+      .s = dot(factor, shifted, slip, m.e1234 * m.e1234),
+      .e12 = dot(factor, m.e12, slip, -m.e1234 * m.e34),
+      .e13 = dot(factor, m.e13, slip, m.e1234 * m.e24),
+      .e14 = dot(factor, m.e14, slip, -m.e1234 * m.e23),
+      .e23 = dot(factor, m.e23, slip, -m.e1234 * m.e14),
+      .e24 = dot(factor, m.e24, slip, m.e1234 * m.e13),
+      .e34 = dot(factor, m.e34, slip, -m.e12 * m.e1234),
+      .e01 = dot(factor, m.e01, slip, dot(-m.e0123, m.e23, -m.e0124, m.e24, -m.e0134, m.e34)),
+      .e02 = dot(factor, m.e02, slip, dot(m.e0123, m.e13, m.e0124, m.e14, -m.e0234, m.e34)),
+      .e03 = dot(factor, m.e03, slip, dot(-m.e0123, m.e12, m.e0134, m.e14, m.e0234, m.e24)),
+      .e04 = dot(factor, m.e04, slip, dot(-m.e0124, m.e12, -m.e0134, m.e13, -m.e0234, m.e23)),
+      .e1234 = dot(factor, m.e1234, slip, m.e1234 * shifted),
       .e0123 = dot(
           factor, m.e0123, slip,
-          dot(q_e0123, shifted, m.e14, q_e0234, -m.e24, q_e0134, m.e34, q_e0124, -m.e04, q_e1234)),
+          dot(m.e0123, shifted, m.e0234, m.e14, -m.e0134, m.e24, m.e0124, m.e34, -m.e04, m.e1234)),
       .e0124 = dot(
           factor, m.e0124, slip,
-          dot(q_e0124, shifted, -m.e13, q_e0234, m.e23, q_e0134, -m.e34, q_e0123, m.e03, q_e1234)),
+          dot(m.e0124, shifted, -m.e0234, m.e13, m.e0134, m.e23, -m.e0123, m.e34, m.e03, m.e1234)),
       .e0134 = dot(
           factor, m.e0134, slip,
-          dot(q_e0134, shifted, m.e12, q_e0234, -m.e23, q_e0124, m.e24, q_e0123, -m.e02, q_e1234)),
+          dot(m.e0134, shifted, m.e0234, m.e12, -m.e0124, m.e23, m.e0123, m.e24, -m.e02, m.e1234)),
       .e0234 = dot(
           factor, m.e0234, slip,
-          dot(q_e0234, shifted, -m.e12, q_e0134, m.e13, q_e0124, -m.e14, q_e0123, m.e01, q_e1234))};
+          dot(m.e0234, shifted, -m.e0134, m.e12, m.e0124, m.e13, -m.e0123, m.e14, m.e01, m.e1234))};
 }
 
 /// sqrt: Rotor -> Rotor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 34 mul, 21 add (17 fused), 2 div, 2 sqrt.
+/// Cost: 27 mul, 18 add (14 fused), 4 div, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
-  const S shifted = S(1) + r.s;
-  const S q_e1234 = dot(r.e1234, shifted, -r.e12, r.e34, r.e13, r.e24, -r.e14, r.e23);
-  const S square = dot(shifted, shifted, r.e12, r.e12, r.e13, r.e13, r.e14, r.e14, r.e23, r.e23,
-                       r.e24, r.e24, r.e34, r.e34, r.e1234, r.e1234);
-  const S omega = q_e1234 * q_e1234;
-  const S radius = scalar::sqrt(mul_add(square, square, -(S(4) * omega)));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
-  const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e1234;
+  const S shifted = select(r.s > S(0), S(1) + r.s,
+                           dot(r.e12, r.e12, r.e13, r.e13, r.e14, r.e14, r.e23, r.e23, r.e24, r.e24,
+                               r.e34, r.e34, r.e1234, r.e1234) /
+                               (S(1) - r.s));
+  const S radius = scalar::sqrt(mul_add(shifted, shifted, -(r.e1234 * r.e1234)));
+  const S root = scalar::sqrt(shifted + radius);
+  const S factor = S(0.5) * (root / radius);
+  const S turn = S(0.5) * -r.e1234 / radius / root;
   return {.s = dot(factor, shifted, turn, r.e1234),
           .e12 = dot(factor, r.e12, turn, -r.e34),
           .e13 = dot(factor, r.e13, turn, r.e24),
@@ -1241,12 +1222,15 @@ template <class S>
 /// cayley_inverse: Motor -> Bivector
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 41 mul, 20 add (19 fused), 1 div.
+/// Cost: 48 mul, 27 add (24 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
-  const S rest = S(1) + m.s;
-  const S inverse = S(1) / mul_add(rest, rest, -(m.e1234 * m.e1234));
-  const S linear = rest * inverse;
+[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+  const S shifted = select(m.s > S(0), S(1) + m.s,
+                           dot(m.e12, m.e12, m.e13, m.e13, m.e14, m.e14, m.e23, m.e23, m.e24, m.e24,
+                               m.e34, m.e34, m.e1234, m.e1234) /
+                               (S(1) - m.s));
+  const S inverse = S(1) / mul_add(shifted, shifted, -(m.e1234 * m.e1234));
+  const S linear = shifted * inverse;
   return {.e12 = dot(linear, m.e12, inverse, m.e1234 * m.e34),
           .e13 = dot(linear, m.e13, inverse, -m.e1234 * m.e24),
           .e14 = dot(linear, m.e14, inverse, m.e1234 * m.e23),
@@ -1317,7 +1301,7 @@ template <class S>
 
 /// normalize: Rotor -> Rotor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 34 mul, 20 add (17 fused), 2 div, 2 sqrt.
+/// Cost: 33 mul, 20 add (17 fused), 2 div, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const S q_e1234 = dot(r.e1234, r.s, -r.e12, r.e34, r.e13, r.e24, -r.e14, r.e23);
@@ -1327,8 +1311,7 @@ template <class S>
   const S radius = scalar::sqrt(mul_add(square, square, -(S(4) * omega)));
   const S root = scalar::sqrt(S(0.5) * (square + radius));
   const S factor = root / radius;
-  const S slip = S(-1) / (root * radius);
-  const S turn = slip * q_e1234;
+  const S turn = -q_e1234 / (root * radius);
   return {.s = dot(factor, r.s, turn, r.e1234),
           .e12 = dot(factor, r.e12, turn, -r.e34),
           .e13 = dot(factor, r.e13, turn, r.e24),

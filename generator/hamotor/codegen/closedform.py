@@ -27,6 +27,7 @@ from hamotor.codegen.program import (
     Product,
     Program,
     Quotient,
+    Select,
     Sum,
     negative,
     number,
@@ -297,8 +298,7 @@ def cayley_inverse_kernel(
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most 5 dimensions")
-    scalar = poly.added({0: {(): 1}}, {0: value[0]})[0]
-    rest = writer.let("rest", polynomial_expression(scalar))
+    rest = Name(_one_plus_scalar(algebra, writer, value))
     twisted = {
         b: poly.scaled(p, -1)
         for b, p in poly.apply_bilinear(algebra.geometric, bivector, quad).items()
@@ -415,52 +415,95 @@ def _mixed_inverse_kernel(
     return _inverse(algebra, parameter, writer, out, result, where)
 
 
+def _one_plus_scalar(algebra: Algebra, writer: Writer, value: PolynomialMultivector) -> str:
+    """Name of 1 + s, s = <M>₀, M ~M = 1; for s ≤ 0 as (1 − s²) / (1 − s), 1 − s² from the others.
+
+    So near M = −1 nothing cancels in it.
+    """
+    norm = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))[0]
+    rest = poly.added({0: norm}, {0: poly.times(value[0], value[0])}, -1)[0]
+    s = polynomial_expression(value[0])
+    far = Quotient(polynomial_expression(rest), Sum(ONE, negative(s)))
+    writer.let("shifted", Select(s, Sum(ONE, s), far))
+    return "shifted"
+
+
 def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
-    """√M = (1 + M) / |1 + M| for M ~M = 1: half the motion, √M √M = M."""
-    kernel = normalize_kernel(algebra, operand, result, where, addend=1)
-    notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
-    return Kernel("sqrt", "√m: half the motion, √m √m = m", kernel.program, None, "", None, notes)
+    """√M = (1 + M) (N + W)^(−1/2) for M ~M = 1, N + W = (1 + ~M)(1 + M) = 2 (1 + s) + 2 Q.
 
-
-def normalize_kernel(
-    algebra: Algebra, operand: Element, result: Element, where: str, addend: int = 0
-) -> Kernel:
-    """M (~M M)^(−1/2) with ~M M = N + Q, Q² = q: (u − Q/2u)/r, r² = N² − q, u² = (N + r)/2.
-
-    addend: a number that is added to M first.
+    s + Q: M's grades 0 and 4.
     """
     (parameter,) = parameters_for(operand)
     writer = Writer()
     value = _versor(parameter, where)
-    if addend:
-        shifted = poly.added({0: {(): addend}}, {0: value[0]})[0]
-        value[0] = writer.let_polynomial("shifted", shifted)
+    shifted: Polynomial = {(_one_plus_scalar(algebra, writer, value),): 1}
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    omega = poly.apply_bilinear(algebra.geometric, quad, quad)
+    if any(omega.keys() - {0}):
+        raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
+    parts = Square(shifted, quad, 1, omega.get(0, {}))
+    value[0] = shifted
+    out = _over_root(algebra, writer, value, parts, twice=True)
+    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
+    return Kernel("sqrt", "√m: half the motion, √m √m = m", program, None, "", None, notes)
+
+
+def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
+    """M (~M M)^(−1/2) with ~M M = N + Q, Q² = q: (u − Q/2u)/r, r² = N² − q, u² = (N + r)/2."""
+    (parameter,) = parameters_for(operand)
+    writer = Writer()
+    value = _versor(parameter, where)
     square = poly.apply_bilinear(algebra.geometric, reversed_value(value), value)
     parts = square_of(algebra, writer, square, "q", where)
-    norm = writer.let("norm2", polynomial_expression(parts.number))
-    if parts.omega:
-        omega = negative(polynomial_expression(parts.omega))
-        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
-        half = Product(number(Fraction(1, 2)), Sum(norm, radius))
-        root = writer.let("root", Call("sqrt", (half,)))
-    else:
-        radius = norm
-        root = writer.let("root", Call("sqrt", (norm,)))
-    if not parts.quad:
-        factor = writer.let("factor", Quotient(ONE, root))
-        out = _combination([(factor, value)], {})
-    else:
-        factor = writer.let("factor", Quotient(root, radius))
-        turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
-        slip = writer.let("slip", Quotient(number(ratio(-parts.content, 2)), Product(root, radius)))
-        content = next(iter(parts.quad.values()))
-        if len(parts.quad) == 1 and len(content) == 1:
-            # one grade-4 blade: take it into the factor, so that each component costs one fma
-            ((monomial, x),) = content.items()
-            slip = writer.let("turn", Product(slip, polynomial_expression({monomial: x})))
-            (blade,) = parts.quad
-            turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): 1}})
-        out = _combination([(factor, value), (slip, turned)], {})
+    norm = writer.let_polynomial("norm2", parts.number)
+    parts = Square(norm, parts.quad, parts.content, parts.omega)
+    out = _over_root(algebra, writer, value, parts)
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "M (~M M)^(−1/2): the unit versor nearest to M"
     return Kernel("normalize", law, program, None)
+
+
+def _over_root(
+    algebra: Algebra,
+    writer: Writer,
+    value: PolynomialMultivector,
+    parts: Square,
+    *,
+    twice: bool = False,
+) -> dict[Blade, Expression]:
+    """A (N + Q)^(−1/2) for a square N + Q that commutes with A; twice: A (2 N + 2 Q)^(−1/2)."""
+    half = number(Fraction(1, 2))
+    norm = polynomial_expression(parts.number)
+    radius = norm
+    doubled: Expression = Product(number(2), norm)
+    if parts.omega:
+        omega = negative(polynomial_expression(parts.omega))
+        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
+        doubled = Sum(norm, radius)
+    square = doubled if twice else Product(half, doubled) if parts.omega else norm
+    root = writer.let("root", Call("sqrt", (square,)))
+    if not parts.quad:
+        factor = writer.let("factor", Quotient(ONE, root))
+        return _combination([(factor, value)], {})
+
+    def over(x: Expression) -> Expression:
+        # near M = −1 the product of the roots, which are near 0 there, may underflow
+        if twice:
+            return Quotient(Quotient(x, radius), root)
+        return Quotient(x, Product(root, radius))
+
+    share: Expression = Quotient(root, radius)
+    factor = writer.let("factor", Product(half, share) if twice else share)
+    turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
+    content = ratio(-parts.content, 2)
+    quad = next(iter(parts.quad.values()))
+    if len(parts.quad) == 1 and len(quad) == 1:
+        # one grade-4 blade: take it into the factor, so that each component costs one fma
+        (blade,) = parts.quad
+        turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): 1}})
+        part = polynomial_expression(poly.scaled(quad, content))
+        slip = writer.let("turn", over(part))
+    else:
+        slip = writer.let("slip", over(number(content)))
+    return _combination([(factor, value), (slip, turned)], {})

@@ -1,0 +1,516 @@
+// How far generated kernels are from the truth, in units of what their conditioning leaves.
+//
+// conditioned.py writes one program an algebra: its product as a table, its element types, and a
+// call of `multilinear` or `closed_form` for each kernel.
+//
+//   PROGRAM measure SCALAR COUNT   one JSON object a kernel
+//   PROGRAM sample SCALAR COUNT    inputs and truth of points, to check the truth
+//
+// The truth is the kernel itself in __float128 (for float: long double).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <span>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include "hamotor/scalar.hpp"
+
+namespace conditioned {
+
+using Quad = hamotor::scalar::Float128;
+using Wide = long double;
+using Numbers = std::vector<Quad>;
+
+// a b = Σ coefficient c over basis blades.
+struct Entry {
+  int a, b, c;
+  double coefficient;
+};
+
+// coefficient × a component, on a blade.
+struct Part {
+  int component;
+  int blade;
+  double coefficient;
+};
+
+struct Element {
+  int size;
+  bool unit;
+  std::span<const Part> embedding;
+  std::span<const Part> reading;
+  std::span<const int> weights;  // of the components: how they scale with the unit of length
+};
+
+// One monomial of a component of the result: up to three numbers among all operands' components.
+struct Term {
+  int output;
+  double coefficient;
+  std::array<int, 3> factors;  // −1: none
+};
+
+struct Algebra {
+  int blades;
+  std::span<const Entry> product;
+  std::span<const double> squares;  // of the blades
+  std::span<const int> grades;
+};
+
+struct Random {
+  std::uint64_t state;
+
+  std::uint64_t bits() {
+    std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    return z ^ (z >> 31);
+  }
+  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
+  double symmetric() { return 2 * uniform() - 1; }
+  double power_of_ten(double low, double high) {
+    return std::pow(10.0, low + (high - low) * uniform());
+  }
+  std::size_t below(std::size_t n) { return static_cast<std::size_t>(bits() % n); }
+  double sign() { return below(2) ? 1 : -1; }
+};
+
+// ---------------------------------------------------------------- inputs
+
+class Sampler {
+ public:
+  Sampler(const Algebra& algebra, std::uint64_t seed) : algebra_(algebra), random_{seed} {}
+
+  Random& random() { return random_; }
+
+  // Components of any size and sign: even ones, of all sizes, sparse, small integers.
+  Numbers numbers(int size) {
+    Numbers x(static_cast<std::size_t>(size));
+    const std::size_t kind = random_.below(6);
+    const double scale = random_.power_of_ten(-3, 3);
+    for (Quad& c : x) {
+      const double even = random_.symmetric();
+      switch (kind) {
+        case 0:
+          c = random_.sign() * random_.power_of_ten(-4, 4);
+          break;
+        case 1:
+          c = random_.below(2) ? scale * even : 0.0;
+          break;
+        case 2:
+          c = static_cast<double>(random_.below(9)) - 4;
+          break;
+        case 3:
+          c = scale * even;
+          break;
+        default:
+          c = even;
+      }
+    }
+    return x;
+  }
+
+  // A unit versor: a product of exponentials of blades, or such a product turned by another.
+  Numbers versor(const Element& element) {
+    const std::vector<int> planes = bivector_blades(element);
+    if (planes.empty()) return normalised(element);
+    std::vector<Quad> m(static_cast<std::size_t>(algebra_.blades));
+    m[0] = 1;
+    for (std::size_t k = random_.below(5); k > 0; --k) m = times(m, factor(planes));
+    if (random_.below(2)) {
+      std::vector<Quad> turn = factor(planes);
+      turn = times(turn, factor(planes));
+      m = times(times(turn, m), reversed(turn));
+    }
+    return read(element, m);
+  }
+
+  // A bivector: any components, or two commuting planes, equal, nearly so or not at all, turned.
+  Numbers bivector(const Element& element) {
+    const std::vector<int> planes = bivector_blades(element);
+    std::vector<Quad> b(static_cast<std::size_t>(algebra_.blades));
+    const std::size_t kind = random_.below(8);
+    const double scale = random_.power_of_ten(-9, 1.3);
+    if (kind < 3) {
+      for (const int blade : planes) b[index(blade)] = some_size(blade, scale);
+      return read(element, b);
+    }
+    const int first = planes[random_.below(planes.size())];
+    const int second = planes[random_.below(planes.size())];
+    const Quad a = kind < 6 ? some_size(first, scale) : Quad(angle());
+    b[index(first)] += a;
+    if ((first & second) == 0) {
+      const double apart = random_.below(3) ? random_.power_of_ten(-17, 0) : 0.0;
+      const Quad other = a * random_.sign() * (Quad(1) + apart);
+      b[index(second)] += random_.below(4) ? other : some_size(second, scale);
+    } else if (random_.below(2)) {
+      b[index(second)] += random_.below(2) ? a * random_.sign() : some_size(second, scale);
+    }
+    std::vector<Quad> turn = factor(planes);
+    turn = times(turn, factor(planes));
+    return read(element, times(times(turn, b), reversed(turn)));
+  }
+
+  // A versor times anything, and not quite a versor any more.
+  Numbers near_versor(const Element& element) {
+    Numbers x = versor(element);
+    const double scale = random_.power_of_ten(-6, 6);
+    const double slip = random_.below(2) ? random_.power_of_ten(-16, -1) : 0.0;
+    Quad size = 0;
+    for (const Quad& c : x) size += c < 0 ? -c : c;
+    for (Quad& c : x) c = scale * (c * (1 + slip * random_.symmetric()));
+    return x;
+  }
+
+ private:
+  static std::size_t index(int blade) { return static_cast<std::size_t>(blade); }
+
+  std::vector<int> bivector_blades(const Element& element) {
+    std::vector<int> found;
+    for (const Part& part : element.embedding)
+      if (algebra_.grades[index(part.blade)] == 2) found.push_back(part.blade);
+    boosting_ = false;
+    for (const Entry& e : algebra_.product) {
+      const bool both = std::count(found.begin(), found.end(), e.a) > 0 &&
+                        std::count(found.begin(), found.end(), e.b) > 0;
+      boosting_ = boosting_ || (both && e.a != e.b && e.c == 0);
+    }
+    return found;
+  }
+
+  double angle() {
+    constexpr double pi = 3.141592653589793;
+    switch (random_.below(8)) {
+      case 0:
+        return 0;
+      case 1:
+        return random_.sign() * random_.power_of_ten(-17, 0);
+      case 2:
+        return random_.sign() * (pi - random_.power_of_ten(-17, 0));
+      case 3:
+        return random_.sign() * pi / 2 * (1 + 0x1p-50 * random_.symmetric());
+      case 4:
+        return random_.sign() * pi / 4;
+      default:
+        return pi * random_.symmetric();
+    }
+  }
+
+  // Boosts stay below 3, and null blades that make boosts below 2: a result grows like exp of
+  // them.  Translations reach 10⁴.
+  double some_size(int blade, double scale) {
+    const double square = algebra_.squares[index(blade)];
+    if (square > 0) return random_.symmetric() * std::min(scale, 3.0);
+    if (square < 0) return random_.symmetric() * scale;
+    if (boosting_) return random_.sign() * random_.power_of_ten(-4, 0.3);
+    return random_.sign() * random_.power_of_ten(-4, random_.below(4) ? 1 : 4);
+  }
+
+  std::vector<Quad> factor(const std::vector<int>& planes) {
+    const int plane = planes[random_.below(planes.size())];
+    std::vector<Quad> m(static_cast<std::size_t>(algebra_.blades));
+    const double square = algebra_.squares[index(plane)];
+    if (square < 0) {
+      const Quad t = angle();
+      m[0] = cosq(t);
+      m[index(plane)] = sinq(t);
+    } else if (square > 0) {
+      const Quad t = random_.sign() * random_.power_of_ten(-8, 0.3);
+      m[0] = coshq(t);
+      m[index(plane)] = sinhq(t);
+    } else {
+      m[0] = 1;
+      m[index(plane)] = random_.below(6) ? some_size(plane, 1) : 0;
+    }
+    return m;
+  }
+
+  std::vector<Quad> times(const std::vector<Quad>& a, const std::vector<Quad>& b) const {
+    std::vector<Quad> c(a.size());
+    for (const Entry& e : algebra_.product) {
+      const Quad& x = a[index(e.a)];
+      const Quad& y = b[index(e.b)];
+      if (x != 0 && y != 0) c[index(e.c)] += e.coefficient * x * y;
+    }
+    return c;
+  }
+
+  std::vector<Quad> reversed(std::vector<Quad> a) const {
+    for (std::size_t i = 0; i < a.size(); ++i)
+      if ((algebra_.grades[i] / 2) % 2) a[i] = -a[i];
+    return a;
+  }
+
+  static Numbers read(const Element& element, const std::vector<Quad>& value) {
+    Numbers x(static_cast<std::size_t>(element.size));
+    for (const Part& p : element.reading)
+      x[index(p.component)] += p.coefficient * value[index(p.blade)];
+    return x;
+  }
+
+  Numbers normalised(const Element& element) {
+    for (;;) {
+      Numbers x = numbers(element.size);
+      std::vector<Quad> value(static_cast<std::size_t>(algebra_.blades));
+      for (const Part& p : element.embedding)
+        value[index(p.blade)] += p.coefficient * x[index(p.component)];
+      const Quad square = times(value, reversed(value))[0];
+      if (!(square > 1e-12Q)) continue;
+      for (Quad& c : x) c /= sqrtq(square);
+      return x;
+    }
+  }
+
+  Algebra algebra_;
+  Random random_;
+  bool boosting_ = false;  // whether two null blades of the last element make a boost
+};
+
+// ---------------------------------------------------------------- judging
+
+template <class S>
+Wide ulp(Wide size) {
+  int exponent = 0;
+  std::frexp(size, &exponent);
+  const Wide unit = std::ldexp(Wide(1), exponent - std::numeric_limits<S>::digits);
+  return std::max<Wide>(unit, std::numeric_limits<S>::min());
+}
+
+// ε of a sum; of nothing, the smallest number that is not denormal.
+template <class S>
+Wide unit(Wide sum) {
+  return std::max<Wide>(std::numeric_limits<S>::epsilon() * sum, std::numeric_limits<S>::min());
+}
+
+inline Wide norm(const std::vector<Wide>& x) {
+  Wide sum = 0;
+  for (const Wide c : x) sum += c * c;
+  return std::sqrt(sum);
+}
+
+template <class R>
+auto components(const R& result) {
+  if constexpr (requires { result.components(); }) {
+    return result.components();
+  } else {
+    return std::array<R, 1>{result};
+  }
+}
+
+// f of operands of the given types, whose components stand one after another in `x`.
+template <class S, template <class> class... Operand, class F>
+auto evaluate(const F& f, const Numbers& x) {
+  std::size_t next = 0;
+  const auto take = [&]<class T>(std::type_identity<T>) {
+    if constexpr (std::is_empty_v<T>) {
+      return T{};
+    } else {
+      std::array<S, T::size> c{};
+      for (S& number : c) number = static_cast<S>(x[next++]);
+      return T::from(c);
+    }
+  };
+  const std::tuple<Operand<S>...> operands{take(std::type_identity<Operand<S>>{})...};
+  return components(std::apply(f, operands));
+}
+
+template <class S>
+Numbers rounded(Numbers x) {
+  for (Quad& c : x) c = static_cast<S>(c);
+  return x;
+}
+
+inline std::string text(Quad x) {
+  std::array<char, 64> buffer{};
+  quadmath_snprintf(buffer.data(), buffer.size(), "%.40Qe", x);
+  return buffer.data();
+}
+
+inline std::string list(const Numbers& x) {
+  std::string all;
+  for (const Quad c : x) all += (all.empty() ? "\"" : ", \"") + text(c) + "\"";
+  return "[" + all + "]";
+}
+
+struct Errors {
+  std::vector<double> scaled;  // in ulp of the condition
+  double other = 0;            // largest, in ulp of the other scale
+  std::size_t nan = 0;
+  double largest = -1;
+  Numbers worst;
+
+  void add(double error, double second, const Numbers& x) {
+    scaled.push_back(error);
+    other = std::max(other, second);
+    if (!(error <= largest)) {
+      largest = error;
+      worst = x;
+    }
+  }
+};
+
+class Run {
+ public:
+  Run(const Algebra& algebra, bool sampling, bool wide, std::size_t count)
+      : algebra_(algebra), sampling_(sampling), wide_(wide), count_(count) {}
+
+  // A product, sandwich or the like: scaled by the sums of the absolute values of its terms.
+  template <template <class> class... Operand, class F>
+  void multilinear(int index, std::array<const Element*, sizeof...(Operand)> elements,
+                   std::span<const Term> terms, F f) {
+    const auto input = [&](Sampler& sampler) {
+      Numbers x;
+      for (const Element* e : elements) {
+        const Numbers part = e->unit ? sampler.versor(*e) : sampler.numbers(e->size);
+        x.insert(x.end(), part.begin(), part.end());
+      }
+      return x;
+    };
+    const auto scales = [terms](const Numbers& x, std::size_t size) {
+      std::vector<Wide> sums(size);
+      for (const Term& t : terms) {
+        Wide product = std::fabs(t.coefficient);
+        for (const int i : t.factors)
+          if (i >= 0) product *= std::fabs(static_cast<Wide>(x[static_cast<std::size_t>(i)]));
+        sums[static_cast<std::size_t>(t.output)] += product;
+      }
+      return sums;
+    };
+    const auto measured = [&]<class S, class T>(S, T) {
+      go<S>(
+          index, input, [&](const Numbers& x) { return evaluate<S, Operand...>(f, x); },
+          [&](const Numbers& x) { return evaluate<T, Operand...>(f, x); },
+          [&](const Numbers& x, const std::vector<Wide>& truth, const std::vector<Wide>& errors,
+              Errors& into) {
+            const std::vector<Wide> sums = scales(x, truth.size());
+            double componentwise = 0;
+            for (std::size_t i = 0; i < errors.size(); ++i)
+              componentwise = std::max(
+                  componentwise, static_cast<double>(std::fabs(errors[i]) / unit<S>(sums[i])));
+            into.add(static_cast<double>(norm(errors) / unit<S>(norm(sums))), componentwise, x);
+          });
+    };
+    wide_ ? measured(double(), Quad()) : measured(float(), Wide());
+  }
+
+  // Anything else, of one operand: scaled by what an ε of the largest component of the same weight
+  // does to the result, added up over the components, or by the result if that is larger.  `unit`
+  // maps a rounded versor to the one it stands for.
+  template <template <class> class Operand, class F, class Unit>
+  void closed_form(int index, const Element& element, const std::function<Numbers(Sampler&)>& input,
+                   F f, Unit unit) {
+    const std::span<const int> weights = element.weights;
+    const auto exact = [&]<class T>(const Numbers& x, std::type_identity<T>) {
+      return evaluate<T, Operand>([&](const Operand<T>& a) { return f(unit(a)); }, x);
+    };
+    const auto measured = [&]<class S, class T>(S, T) {
+      go<S>(
+          index, input, [&](const Numbers& x) { return evaluate<S, Operand>(f, x); },
+          [&](const Numbers& x) { return exact(x, std::type_identity<T>{}); },
+          [&](const Numbers& x, const std::vector<Wide>& truth, const std::vector<Wide>& errors,
+              Errors& into) {
+            constexpr Wide step = std::numeric_limits<S>::epsilon();
+            const auto here = exact(x, std::type_identity<Wide>{});
+            std::vector<Wide> change(truth.size());
+            for (std::size_t j = 0; j < x.size(); ++j) {
+              Quad largest = 0;
+              for (std::size_t k = 0; k < x.size(); ++k)
+                if (weights[k] == weights[j]) largest = std::max(largest, fabsq(x[k]));
+              if (largest == 0) continue;
+              Numbers moved = x;
+              moved[j] += step * largest;
+              const auto there = exact(moved, std::type_identity<Wide>{});
+              for (std::size_t i = 0; i < change.size(); ++i)
+                change[i] += std::fabs(there[i] - here[i]) / step;
+            }
+            const Wide size = norm(truth);
+            const Wide condition = norm(change);
+            const Wide error = norm(errors);
+            if (!std::isfinite(condition)) return;
+            // no digit is left to be right
+            if (condition * std::numeric_limits<S>::epsilon() > size / 8) return;
+            into.add(static_cast<double>(error / ulp<S>(std::max(size, condition))),
+                     static_cast<double>(error / ulp<S>(size)), x);
+          });
+    };
+    wide_ ? measured(double(), Quad()) : measured(float(), Wide());
+  }
+
+  const Algebra& algebra() const { return algebra_; }
+
+ private:
+  template <class S, class Input, class Kernel, class Truth, class Judge>
+  void go(int index, const Input& input, const Kernel& kernel, const Truth& exact,
+          const Judge& judge) {
+    Sampler sampler(algebra_, 0x68616d6fu + static_cast<std::uint64_t>(index));
+    Errors errors;
+    for (std::size_t i = 0; i < count_; ++i) {
+      const Numbers x = rounded<S>(input(sampler));
+      const auto truth = exact(x);
+      if (sampling_) {
+        std::printf("{\"index\": %d, \"input\": %s, \"truth\": %s}\n", index, list(x).c_str(),
+                    list(Numbers(truth.begin(), truth.end())).c_str());
+        continue;
+      }
+      std::vector<Wide> sizes;
+      std::vector<Wide> off;
+      bool nan = false;
+      bool finite = true;
+      const auto found = kernel(x);
+      for (std::size_t k = 0; k < truth.size(); ++k) {
+        sizes.push_back(static_cast<Wide>(truth[k]));
+        off.push_back(static_cast<Wide>(truth[k] - found[k]));
+        finite = finite && std::fabs(sizes[k]) < std::numeric_limits<S>::max() / 16;
+        nan = nan || !std::isfinite(found[k]);
+      }
+      if (!finite) continue;
+      if (nan) {
+        ++errors.nan;
+        errors.worst = x;
+        continue;
+      }
+      judge(x, sizes, off, errors);
+    }
+    if (sampling_) return;
+    std::vector<double>& scaled = errors.scaled;
+    const std::size_t half = scaled.size() / 2;
+    std::nth_element(scaled.begin(), scaled.begin() + static_cast<std::ptrdiff_t>(half),
+                     scaled.end());
+    std::printf(
+        "{\"index\": %d, \"points\": %zu, \"judged\": %zu, \"max_ulp\": %.4g, \"median_ulp\": "
+        "%.4g, \"other\": %.4g, \"nan\": %zu, \"worst\": %s}\n",
+        index, count_, scaled.size(), scaled.empty() ? 0.0 : errors.largest,
+        scaled.empty() ? 0.0 : scaled[half], errors.other, errors.nan, list(errors.worst).c_str());
+    std::fflush(stdout);
+  }
+
+  Algebra algebra_;
+  bool sampling_;
+  bool wide_;
+  std::size_t count_;
+};
+
+inline int main(int argc, char** argv, const Algebra& algebra, void (*kernels)(Run&)) {
+  if (argc != 4) {
+    std::fprintf(stderr, "usage: measure|sample float|double COUNT\n");
+    return 2;
+  }
+  Run run(algebra, std::strcmp(argv[1], "sample") == 0, std::strcmp(argv[2], "double") == 0,
+          static_cast<std::size_t>(std::atoll(argv[3])));
+  kernels(run);
+  return 0;
+}
+
+}  // namespace conditioned
