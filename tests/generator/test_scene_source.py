@@ -381,3 +381,39 @@ def test_a_scene_file_reaches_the_oracle(oracle: str) -> None:
                 k = of.group.motor.index(name.replace("e13", "e31"))
                 sign = -1 if name == "e13" else 1
                 assert sign * state[k] == pytest.approx(float(value), abs=1e-10)
+
+
+def test_a_spring_and_the_same_potential_as_an_expression_move_alike() -> None:
+    """In a frame that is not the principal one; both as kicks of the splitting."""
+    head = """
+algebra = "pga3"
+[[body]]
+name = "brick"
+mass = 1.5
+inertia = [[0.4, 0.05, 0], [0.05, 0.7, 0], [0, 0, 0.9]]
+center_of_mass = [0.1, 0, 0]
+position = [0.3, -0.1, 0.4]
+velocity = [0.2, -0.6, 0.3]
+angular_velocity = [0.8, 0.5, -1.1]
+[[interaction]]
+"""
+    spring = """
+type = "spring"
+body = "brick"
+at = [0.3, -0.2, 0.5]
+anchor = [0.2, 0.1, 2.0]
+stiffness = 6
+rest_length = 0.8
+"""
+    potential = """
+type = "potential"
+expression = "k/2*(distance(at(brick, 0.3, -0.2, 0.5), a) - l)^2"
+parameters = { k = 6.0, a = [0.2, 0.1, 2.0], l = 0.8 }
+"""
+    ends = []
+    for acting in (spring, potential):
+        of = scene(f"{head}{acting}[time]\nend = 1\nstep = 0.01\n")
+        with library(of).start("splitting2", step=0.01, state=of.initial_state) as run:
+            run.advance(200, 1, None)
+            ends.append(run.state())
+    assert ends[0] == pytest.approx(ends[1], abs=1e-13)

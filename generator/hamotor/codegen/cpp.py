@@ -139,12 +139,18 @@ def signature_text(name: str, program: Program) -> str:
     return f"{scalar_type(program.result)} {name}({', '.join(arguments)})"
 
 
+def binding_lines(program: Program) -> list[str]:
+    """A statement for each binding, unformatted."""
+    return [
+        f"const {'auto' if isinstance(x, Call) and x.function in PAIRS else 'S'} {name} ="
+        f" {expression_text(x)};"
+        for name, x in program.bindings
+    ]
+
+
 def body_lines(program: Program) -> list[str]:
     """Statements of the function body, unformatted."""
-    lines = []
-    for name, expression in program.bindings:
-        kind = "auto" if isinstance(expression, Call) and expression.function in PAIRS else "S"
-        lines.append(f"const {kind} {name} = {expression_text(expression)};")
+    lines = binding_lines(program)
     if program.result is None or program.result.name == "Scalar":
         ((_, expression),) = program.outputs
         lines.append(f"return {expression_text(expression)};")

@@ -55,12 +55,17 @@ class Point:
 
 @dataclass(frozen=True)
 class Coordinates:
-    """Symbols of one body on `group`; those of several bodies differ by the prefix `BODY.`."""
+    """Symbols of one body on `group`; those of several bodies differ by the prefix `BODY.`.
+
+    pivot: where the body frame's origin is in the world, on a group that does not move it; () is
+        the world's origin.
+    """
 
     body: str
     algebra: Algebra
     group: LieGroup
     prefix: str = ""
+    pivot: tuple[Expr, ...] = ()
     _points: dict[tuple[Expr, ...], Point] = field(default_factory=dict, repr=False, compare=False)
 
     def _symbol(self, name: str) -> Expr:
@@ -190,9 +195,9 @@ class Coordinates:
 
     @cached_property
     def origin(self) -> tuple[Expr, ...]:
-        """x in the components of M; zeros where the group fixes the origin."""
+        """x in the components of M; the pivot where the group does not move it."""
         if not self.space.translates:
-            return (sympy.Integer(0),) * self.dimension
+            return self.pivot or (sympy.Integer(0),) * self.dimension
         return tuple(self.scale * self.image[j + 1][0] for j in range(self.dimension))
 
     def at(self, place: tuple[Expr, ...]) -> tuple[Expr, ...]:
@@ -202,6 +207,8 @@ class Coordinates:
         """
         if not self.space.affine:
             return self._conformal_point(place)
+        if not any(place) and not self.space.translates:
+            return self.origin
         if place not in self._points:
             name = "x" if not any(place) else f"y{1 + sum(any(a) for a in self._points)}"
             self._points[place] = Point(
@@ -210,6 +217,13 @@ class Coordinates:
                 self.velocities_at(place),
             )
         return self._points[place].symbols
+
+    def world_velocities_at(self, y: tuple[Expr, ...]) -> tuple[tuple[Expr, ...], ...]:
+        """What each generator of the world does to a point of the body that is at y: about the
+        pivot, where the group does not move it."""
+        if self.space.translates:
+            return self.velocities_at(y)
+        return self.velocities_at(tuple(a - b for a, b in zip(y, self.origin, strict=True)))
 
     def velocities_at(self, place: tuple[Expr, ...]) -> tuple[tuple[Expr, ...], ...]:
         """ξ_i(a), what each generator does to a point a: of the body's or of the world's space."""

@@ -93,7 +93,9 @@ class Hamiltonian:
                 + sum(
                     v * g
                     for point, gradient in self.gradients(body)
-                    for v, g in zip(body.velocities_at(point.symbols)[i], gradient, strict=True)
+                    for v, g in zip(
+                        body.world_velocities_at(point.symbols)[i], gradient, strict=True
+                    )
                 )
                 for i in range(len(body.momenta))
             )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hamotor.scene import Body, GeneralScene, Gravity, Interaction, Scene, Spring
+    from hamotor.scene import Body, GeneralScene, Scene
 
 
 def account(scene: Scene | GeneralScene) -> str:
@@ -78,7 +78,7 @@ def _rigid(scene: Scene) -> str:
     blocks += [_body(body) for body in scene.bodies]
     if scene.interactions:
         blocks.append(["acting"])
-        blocks[-1] += [f"  {_interaction(interaction)}" for interaction in scene.interactions]
+        blocks[-1] += [f"  {line}" for line in scene.general.acting]
     blocks.append(["conserved", *_conserved(scene)])
     blocks.append(["left out", *(f"  {line}" for line in _left_out(scene))])
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
@@ -110,28 +110,6 @@ def _body(body: Body) -> list[str]:
     if not body.group.translates:
         lines.append("  turns about its position, which is fixed")
     return lines
-
-
-def _interaction(interaction: Interaction) -> str:
-    from hamotor.scene import Gravity
-
-    return _gravity(interaction) if isinstance(interaction, Gravity) else _spring(interaction)
-
-
-def _gravity(gravity: Gravity) -> str:
-    return f"gravity {_numbers(gravity.acceleration)} m/s^2 on every body"
-
-
-def _spring(spring: Spring) -> str:
-    end = (
-        f"the point {_numbers(spring.anchor or ())} of the world"
-        if spring.other is None
-        else f"{_numbers(spring.other_at or ())} of {spring.other}"
-    )
-    return (
-        f"spring from {_numbers(spring.at)} of {spring.body} to {end}, "
-        f"{spring.stiffness:g} N/m, rest length {spring.rest_length:g} m"
-    )
 
 
 def _conserved(scene: Scene | GeneralScene) -> list[str]:

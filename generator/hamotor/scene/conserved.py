@@ -83,7 +83,7 @@ def _demands_on_motions(scene: Scene) -> list[Row]:
             else:
                 rows += [[*row, zero, zero, zero] for row in _cross_with(g)]
                 rows.append([zero, zero, zero, *g])
-        elif interaction.anchor is not None:
+        elif isinstance(interaction, Spring) and interaction.anchor is not None:
             a = [decimal(x) for x in interaction.anchor]
             if scene.group.dimension == 2:
                 rows += [[-a[1], one, zero], [a[0], zero, one]]
@@ -102,6 +102,8 @@ def _demands_on_rotations(scene: Scene) -> list[Row]:
             if any(any(body.center_of_mass) for body in scene.bodies):
                 rows += _cross_with([decimal(x) for x in interaction.acceleration])
             continue
+        if not isinstance(interaction, Spring):
+            continue
         ends = [(bodies[interaction.body].position, any(interaction.at))]
         if interaction.other is None:
             ends.append((interaction.anchor or (), False))
@@ -115,13 +117,17 @@ def _demands_on_rotations(scene: Scene) -> list[Row]:
 def is_free(scene: Scene, body: Body) -> bool:
     """Whether nothing acts on `body`, so that its momentum stays on one coadjoint orbit."""
     for interaction in scene.interactions:
-        if isinstance(interaction, Spring):
+        if isinstance(interaction, Gravity):
+            moves = scene.group.translates or any(body.center_of_mass)
+            if moves and any(interaction.acceleration):
+                return False
+        elif isinstance(interaction, Spring):
             if body.name not in (interaction.body, interaction.other):
                 continue
             at = interaction.at if body.name == interaction.body else interaction.other_at
             if scene.group.translates or any(at or ()):
                 return False
-        elif any(interaction.acceleration) and (scene.group.translates or any(body.center_of_mass)):
+        else:
             return False
     return True
 

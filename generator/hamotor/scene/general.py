@@ -70,6 +70,8 @@ class GeneralScene:
     group: Group
     bodies: tuple[GeneralBody, ...]
     hamiltonian: Hamiltonian
+    potential: Hamiltonian
+    """The part of H that is neither kinetic energy nor uniform gravity nor springs."""
     acting: tuple[str, ...]
     """What H is made of, a line each, for `hamotor show`."""
     time: Time

@@ -63,6 +63,7 @@ class _System:
 
     drafts: Sequence[_Draft]
     energy: Expr = field(default_factory=lambda: sympy.Integer(0))
+    potential: Expr = field(default_factory=lambda: sympy.Integer(0))
     parameters: dict[Expr, Expr] = field(default_factory=dict)
     applied: list[list[Expr]] = field(default_factory=list)
     acting: list[str] = field(default_factory=list)
@@ -76,6 +77,11 @@ class _System:
                 f"unknown body {quoted(name)}; bodies are {listed(names)}.{suggest(name, names)}"
             )
         return self.drafts[names.index(name)]
+
+    def add_potential(self, energy: Expr) -> None:
+        """Add a potential that the runtime has no formula of its own for."""
+        self.energy += energy
+        self.potential += energy
 
     def apply(self, draft: _Draft, forque: Sequence[Expr]) -> None:
         """Add an applied forque."""
@@ -139,6 +145,7 @@ def read_general(
         group=view,
         bodies=_started(top, drafts, hamiltonian),
         hamiltonian=hamiltonian,
+        potential=Hamiltonian(hamiltonian.bodies, system.potential, system.parameters),
         acting=tuple(system.acting),
         time=time,
         output=output,
@@ -164,7 +171,8 @@ class _Reader:
         name = table.name("name")
         table = Table(file, f'body {number} "{name}"', table.values, table.section, self.view)
         prefix = f"{name}." if self.several else ""
-        body = Coordinates(name, self.algebra, self.group, prefix=prefix)
+        pivot = () if self.view.translates else _numbers(table.vector("position"))
+        body = Coordinates(name, self.algebra, self.group, prefix, pivot)
         mass, tensor = _mass(table, body, self.mass_distribution)
         matrix = _kinetic_matrix(table, body, mass)
         return _Draft(
@@ -246,7 +254,7 @@ def _motor(
     names = table.group.motor
     if table.has("motor"):
         for key in ("position", "orientation", "scale"):
-            if table.has(key):
+            if table.has(key) and (key != "position" or table.group.translates):
                 table.fail(f'"motor" and "{key}" contradict each other; give one')
         given = table.components("motor", names)
         motor = tuple(given.get(name, 0.0) for name in names)
@@ -255,7 +263,7 @@ def _motor(
         return motor
     if table.group.dimension not in (2, 3) or "s" not in names:
         for key in ("position", "orientation"):
-            if table.has(key):
+            if table.has(key) and (key != "position" or table.group.translates):
                 table.fail(f'{table.group.name}: give "motor" instead of "{key}"')
         return tuple(1.0 if name == "s" else 0.0 for name in names)
     position = table.vector("position") if table.group.translates else ()
@@ -383,7 +391,7 @@ def _spring(table: Table, system: _System, _number_of: int) -> None:
 def _potential(table: Table, system: _System, number: int) -> None:
     text = table.expression("expression")
     words = _vocabulary(table, _speakers(system, rates=False, momenta=False), system, f"{number}.")
-    system.energy += read_number(text, words, f"{table.file}: {table.place}: expression")
+    system.add_potential(read_number(text, words, f"{table.file}: {table.place}: expression"))
     system.acting.append(f"potential {text}")
 
 
@@ -392,7 +400,7 @@ def _newtonian(table: Table, system: _System, _number_of: int) -> None:
     if table.one_of("center", "other") == "center":
         center = _numbers(table.vector("center"))
         strength = _number(table.number("strength"))
-        system.energy += _attracted(table, draft, center, strength)
+        system.add_potential(_attracted(table, draft, center, strength))
         system.acting.append(
             f"Newtonian attraction of {draft.name} to {_shown(table.vector('center'))},"
             f" {table.number('strength'):g} m^3/s^2, {_as(draft)}"
@@ -403,7 +411,7 @@ def _newtonian(table: Table, system: _System, _number_of: int) -> None:
         table.fail(f'"{draft.name}" does not attract itself', "other")
     constant = _number(table.number("constant"))
     one, two = _weights(table, draft), _weights(table, other)
-    system.energy += constant * interactions.newtonian_of_points(one, two)
+    system.add_potential(constant * interactions.newtonian_of_points(one, two))
     system.acting.append(
         f"Newtonian attraction between {draft.name} and {other.name},"
         f" G = {table.number('constant'):g} m^3/(kg s^2), point by point"
@@ -443,7 +451,7 @@ def _attracted(table: Table, draft: _Draft, center: Sequence[Expr], strength: Ex
 def _dipole(table: Table, system: _System, _number_of: int) -> None:
     draft = system.draft(table)
     vectors = [_numbers(table.vector(key)) for key in ("at", "moment", "center", "source")]
-    system.energy += interactions.dipole(draft.coordinates, *vectors)
+    system.add_potential(interactions.dipole(draft.coordinates, *vectors))
     system.acting.append(
         f"dipole {_shown(table.vector('moment'))} A m^2 of {draft.name} in the field of"
         f" {_shown(table.vector('source'))} A m^2 at {_shown(table.vector('center'))}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 from hamotor.codegen import cpp
@@ -12,7 +13,7 @@ from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
 from hamotor.scene.general import GeneralScene
-from hamotor.scene.source import literal_text, rendered, text_literal
+from hamotor.scene.source import literal_text, rendered, shortened, text_literal
 
 
 @dataclass(frozen=True)
@@ -24,10 +25,7 @@ class _Body:
     @property
     def lines(self) -> list[str]:
         """Its bindings."""
-        return [
-            f"const S {name} = {cpp.expression_text(expression)};"
-            for name, expression in self.program.bindings
-        ]
+        return cpp.binding_lines(self.program)
 
     @property
     def used(self) -> set[str]:
@@ -73,7 +71,13 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
     units = ["m"] * first.dimension
     if first.space.affine and first.space.scales:
         place, names, units = [*place, first.scale], [*names, "scale"], [*units, "1"]
-    own = [(q, x) for q, x in scene.invariants if x is not None]
+    pivots = None
+    if not first.space.translates:
+        pivots = [
+            ", ".join(cpp.number_text(Fraction(int(x.p), int(x.q))) for x in b.coordinates.origin)
+            for b in scene.bodies
+        ]
+    own = [(q, x) for q, x in scene.invariants if x is not None and not _has_column(scene, q.name)]
     return rendered(
         "general_scene.cpp.jinja",
         scene=scene,
@@ -82,7 +86,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,
         group=scene.group.name,
-        hamiltonian=_wrapped(str(scene.hamiltonian.energy)),
+        hamiltonian=shortened(str(scene.hamiltonian.energy)),
         bodies=[text_literal(body.name) for body in scene.bodies],
         has_forque=any(x != Number(0) for x in forques),
         energy=_Body(system.energy),
@@ -109,15 +113,11 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
                 system.stages_of(first, 0),
             )
         ),
+        pivots=pivots,
         scales=len(names) > first.dimension,
         quantities=_quantities(system, [x for _, x in own]),
         conserved=[_conserved(scene, q, own) for q, _ in scene.invariants],
     )
-
-
-def _wrapped(text: str) -> str:
-    """A one-line comment of bearable length."""
-    return text if len(text) <= 400 else f"{text[:397]}..."
 
 
 def _motor_unit(scene: GeneralScene, blade: str) -> str:
@@ -128,6 +128,13 @@ def _motor_unit(scene: GeneralScene, blade: str) -> str:
         power = ("i" in blade) - ("0" in blade)
         return {1: "m", 0: "1", -1: "1/m"}[power]
     return "1"
+
+
+def _has_column(scene: GeneralScene, name: str) -> bool:
+    """Whether it is one component of a body's momentum."""
+    return any(
+        name == f"{b.name}.momentum.{g}" for b in scene.bodies for g in scene.group.generators
+    )
 
 
 def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | None:
@@ -147,7 +154,7 @@ def _conserved(scene: GeneralScene, quantity: Any, own: Sequence[Any]) -> dict[s
     names = [body.name for body in scene.bodies]
     indices = [q.name for q, _ in own]
     is_own = quantity.name in indices
-    kind = "own" if is_own else quantity.name.split(".", 1)[0]
+    kind = "own" if is_own else "momentum" if quantity.body else quantity.name.split(".", 1)[0]
     return {
         "kind": kind,
         "name": text_literal(quantity.name),

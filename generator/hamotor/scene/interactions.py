@@ -37,4 +37,9 @@ class Spring:
     """ℓ, m."""
 
 
-Interaction = Gravity | Spring
+@dataclass(frozen=True)
+class Potential:
+    """Any other potential of the places of bodies; `Scene.potential` holds their sum."""
+
+
+Interaction = Gravity | Spring | Potential

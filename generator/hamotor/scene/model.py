@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,12 +14,13 @@ from hamotor.scene import inertia
 from hamotor.scene.conserved import ConservedQuantity, conserved_quantities
 from hamotor.scene.exact import decimal
 from hamotor.scene.groups import Group
-from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
 from hamotor.scene.motors import Matrix, Vector, cross, motor_of, rotation_matrix
 from hamotor.scene.principal import PrincipalFrame, principal_frame
 
 if TYPE_CHECKING:
     from hamotor.mechanics.hamiltonian import Hamiltonian
+    from hamotor.scene.general import GeneralScene
 
 
 @dataclass(frozen=True)
@@ -126,6 +128,20 @@ class Scene:
     output: Output
     sha256: str
     """Of the file's bytes, hexadecimal."""
+    reread: Callable[[], GeneralScene] = field(repr=False, compare=False)
+    """Reads `general`."""
+
+    @cached_property
+    def general(self) -> GeneralScene:
+        """The same scene with nothing specialised: coordinates on a group and a Hamiltonian."""
+        return self.reread()
+
+    @cached_property
+    def potential(self) -> Hamiltonian | None:
+        """The sum of all `Potential`s over the user's body frames; None where there are none."""
+        if not any(isinstance(i, Potential) for i in self.interactions):
+            return None
+        return self.general.potential
 
     @property
     def algebra(self) -> str:
@@ -145,7 +161,9 @@ class Scene:
     @cached_property
     def conserved(self) -> tuple[ConservedQuantity, ...]:
         """What the exact motion keeps constant: energy, momenta by symmetry, Casimirs."""
-        return conserved_quantities(self)
+        if self.potential is None:
+            return conserved_quantities(self)
+        return tuple(q for q in self.general.conserved if _has_a_formula(self, q))
 
     @cached_property
     def hamiltonian(self) -> Hamiltonian:
@@ -216,3 +234,9 @@ class Scene:
                 angular = angular + cross(body.position, linear)
             total[:rotations] += angular
         return tuple(float(x) for x in total)
+
+
+def _has_a_formula(scene: Scene, quantity: ConservedQuantity) -> bool:
+    """Whether the runtime computes it for rigid bodies: all but combinations of own momenta."""
+    momenta = {f"{b.name}.momentum.{g}" for b in scene.bodies for g in scene.group.generators}
+    return not quantity.body or ".casimir." in quantity.name or quantity.name in momenta

@@ -19,7 +19,7 @@ from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, bundled_groups, groups_of
-from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
     Matrix,
@@ -119,7 +119,10 @@ def parse_scene(contents: bytes, *, name: str, file: str) -> Scene | GeneralScen
         time=_time(top.table("time", schema.TIME, heading=True)),
         output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
         sha256=hashlib.sha256(contents).hexdigest(),
+        reread=lambda: _general(top, algebra, name, contents),
     )
+    if scene.potential is not None and not scene.general.hamiltonian.autonomous:
+        return scene.general
     _refuse_singular_springs(top, scene)
     with np.errstate(all="ignore"):
         if not math.isfinite(sum(scene.initial_energy)):
@@ -127,11 +130,12 @@ def parse_scene(contents: bytes, *, name: str, file: str) -> Scene | GeneralScen
     return scene
 
 
-RIGID_INTERACTIONS = ("gravity", "spring")
+RIGID_INTERACTIONS = ("gravity", "spring", "potential", "newtonian", "dipole")
+"""What acts on places alone, so that it is a kick between free motions."""
 
 
 def _is_general(top: Table, algebra: str) -> bool:
-    """Whether the scene needs more than rigid bodies under gravity and springs."""
+    """Whether the scene needs more than rigid bodies in potentials."""
     if algebra not in ALGEBRAS or top.has("hamiltonian") or top.has("lagrangian"):
         return True
     if top.has("group") and top.values["group"] not in [g.name for g in groups_of(algebra)]:
@@ -417,6 +421,8 @@ def _interactions(top: Table, bodies: tuple[Body, ...], most: int) -> tuple[Inte
         table.refuse_unknown_keys()
         if kind == "gravity":
             interactions.append(Gravity(acceleration=table.vector("acceleration")))
+        elif kind != "spring":
+            interactions.append(Potential())
         else:
             interactions.append(_spring(table, [body.name for body in bodies]))
     return tuple(interactions)

@@ -47,6 +47,7 @@ def scene_source(
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         bodies=[_body(body, suffix) for body in scene.bodies],
         interactions=_interactions(scene, suffix),
+        potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
     )
 
@@ -101,10 +102,49 @@ def _body(body: Body, suffix: str) -> dict[str, Any]:
     return {
         "name": body.name,
         "type": "FreeBody" if body.group.translates else "PivotedBody",
+        "is_principal": frame.is_body_frame,
         "moments": [literal_text(x, suffix) for x in frame.moments],
         "frame": _literals(frame.motor, suffix),
         "arguments": arguments,
     }
+
+
+def _potential(scene: Scene) -> dict[str, Any] | None:
+    """Everything that acts on places and is no gravity and no spring: one potential."""
+    if scene.potential is None:
+        return None
+    from hamotor.codegen import cpp
+    from hamotor.codegen.program import Number, Program
+    from hamotor.mechanics.system import System
+
+    system = System(scene.potential)
+
+    def text_of(program: Program) -> dict[str, Any]:
+        used = cpp.used_names(program)
+        return {
+            "bodies": [k for k in range(len(scene.bodies)) if f"m{k}" in used],
+            "lines": cpp.binding_lines(program),
+            "cost": str(program.cost),
+        }
+
+    components: dict[int, list[str]] = {}
+    acts: set[int] = set()
+    for name, expression in system.forque.outputs:
+        k = int(name.removeprefix("forque").split(".")[0])
+        components.setdefault(k, []).append(cpp.expression_text(expression))
+        if expression != Number(0):
+            acts.add(k)
+    value = cpp.expression_text(system.energy.outputs[0][1])
+    return {
+        "text": shortened(str(scene.potential.energy)),
+        "energy": {**text_of(system.energy), "value": value},
+        "forque": {**text_of(system.forque), "outputs": [(k, components[k]) for k in sorted(acts)]},
+    }
+
+
+def shortened(text: str) -> str:
+    """Text for a comment, of bearable length."""
+    return text if len(text) <= 400 else f"{text[:397]}..."
 
 
 def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:

@@ -30,6 +30,7 @@ namespace hamotor {
 enum class Quantity {
   energy,            ///< H
   energy_balance,    ///< H less the work done by time and by applied forques
+  momentum,          ///< a component of one body's momentum, which has a column anyway
   spatial_momentum,  ///< a combination of the total momentum in the world frame
   p_squared,         ///< |P|² of one body, a Casimir
   p_dot_pi,          ///< P·Π of one body, a Casimir
@@ -53,8 +54,8 @@ struct Conserved {
   std::size_t index = 0;  ///< among `Scene::quantities`
 };
 
-/// A scene that says itself where a body is: `place(motor)` are the values of the columns that
-/// `place_names` and `place_units` describe, and it has units for its motors and momenta.
+/// A scene that says itself where a body is: `place(i, motor)` are those of body i in the columns
+/// that `place_names` and `place_units` describe, and it has units for its motors and momenta.
 template <class Scene>
 concept PlacedScene =
     requires(const typename Scene::Group::template Element<typename Scene::Scalar>& m) {
@@ -62,7 +63,7 @@ concept PlacedScene =
       { Scene::place_units.size() } -> std::convertible_to<std::size_t>;
       { Scene::motor_units.size() } -> std::convertible_to<std::size_t>;
       { Scene::momentum_units.size() } -> std::convertible_to<std::size_t>;
-      { Scene::place(m).size() } -> std::convertible_to<std::size_t>;
+      { Scene::place(std::size_t{}, m).size() } -> std::convertible_to<std::size_t>;
     };
 
 /// What a compiled scene says about itself, as a type.
@@ -110,6 +111,7 @@ template <class Scene>
 template <class G>
 [[nodiscard]] constexpr bool has_own_column(const Conserved<G>& conserved) noexcept {
   if (conserved.quantity == Quantity::energy) return false;
+  if (conserved.quantity == Quantity::momentum) return false;
   if (conserved.quantity != Quantity::spatial_momentum) return true;
   std::size_t terms = 0;
   bool unit = true;
@@ -432,7 +434,7 @@ class Run {
 
   [[nodiscard]] static auto place([[maybe_unused]] std::size_t i, const Motor& motor) noexcept {
     if constexpr (PlacedScene<Scene>) {
-      return Scene::place(motor);
+      return Scene::place(i, motor);
     } else if constexpr (Space<G>::translates) {
       return sandwich(motor, typename Space<G>::template Origin<S>{}).components();
     } else {
