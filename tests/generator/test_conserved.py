@@ -122,7 +122,7 @@ def potentials_along(of: Scene, motion: Array, rng: random.Random) -> Array:
         if isinstance(interaction, Gravity):
             g = np.array(interaction.acceleration)
             changes += [-b.mass * g @ velocity(places[b.name]) for b in of.bodies]
-        else:
+        elif isinstance(interaction, Spring):
             x, v = places[interaction.body], velocity(places[interaction.body])
             y, w = np.array(interaction.anchor or [0.0] * d), np.zeros(d)
             if interaction.other is not None:

@@ -168,9 +168,7 @@ class Scene:
     @cached_property
     def hamiltonian(self) -> Hamiltonian:
         """H in symbols, over momenta and places in the user's body frames."""
-        from hamotor.scene.hamiltonians import rigid_hamiltonian
-
-        return rigid_hamiltonian(self)
+        return self.general.hamiltonian
 
     @property
     def gravity(self) -> Vector | None:
@@ -200,15 +198,13 @@ class Scene:
     def initial_energy(self) -> tuple[float, float, float]:
         """Kinetic energy, potential energy, and the sum of all terms' magnitudes, J, at the start.
 
-        The potential of gravity is measured from the world's origin, with a fixed point from there.
+        The potential of gravity is measured from the world's origin.
         """
         kinetic = sum(0.5 * float(np.array(b.momentum) @ b.rate) for b in self.bodies)
         potentials = []
         if self.gravity is not None:
             for body in self.bodies:
                 height = body.in_world(body.center_of_mass)
-                if not self.group.translates:
-                    height = height - np.array(body.position)
                 potentials.append(-body.mass * float(np.array(self.gravity) @ height))
         for spring in self.springs:
             length = float(np.linalg.norm(self.spring_vector(spring)))

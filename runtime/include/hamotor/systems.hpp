@@ -347,8 +347,7 @@ class FreeBody {
 
 /// Rigid body with a fixed point, in the principal frame about that point: mass (kg), principal
 /// moments about the fixed point (kg m²), centre of mass (m, that frame), and where in the world
-/// the fixed point is (m).  Potentials of gravity and spatial momenta are taken about the fixed
-/// point.
+/// the fixed point is (m).  Spatial momenta are taken about the fixed point.
 template <class G, class S, RotationSplit split = RotationSplit{}>
 class PivotedBody {
  public:
@@ -411,10 +410,10 @@ class PivotedBody {
     return sandwich(reverse(m), Point::from(y));
   }
 
-  /// −m g·R c, c the centre of mass from the fixed point; g in the world frame, m/s².
+  /// −m g·x, x the centre of mass; g in the world frame, m/s².
   [[nodiscard]] constexpr S weight_potential(const Element& m, const Direction& g) const noexcept {
-    const Direction c = sandwich(m, Direction::from(center_));
-    return -mass_ * detail::dot(g.components(), c.components());
+    const Point x = in_world(m, Point::from(center_));
+    return -mass_ * detail::dot(g.components(), x.components());
   }
 
   /// The body forque (+dH) of a field g: −c × m Rᵀg.
