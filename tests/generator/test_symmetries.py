@@ -18,7 +18,9 @@ from tests.generator.test_conserved import CASES
 from tests.rigid import RIGID, read_scene
 
 from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
+from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.symmetries import conserved
+from hamotor.mechanics.system import System
 
 SCENES = {name: read_scene(name) for name in RIGID} | CASES
 
@@ -229,4 +231,41 @@ def test_two_bodies_keep_the_total_and_a_symmetric_one_its_spin() -> None:
         "energy",
         *(f"spatial_momentum.{g.name}" for g in a.group.generators),
         "a.momentum.e12",
+    ]
+
+
+def test_functions_are_continued_where_their_domain_is_far_away() -> None:
+    body = body_on("pga3", "T3")
+    x, y, _ = body.position
+    for potential in (sympy.sqrt(x - 1000), sympy.log(x - 7) * sympy.acos(3 + x)):
+        assert names(Hamiltonian((body,), free(body, 1, 1, 1) + potential)) == [
+            "energy",
+            "spatial_momentum.e02",
+            "spatial_momentum.e03",
+        ]
+    angle = sympy.atan2(sympy.sqrt(x - 1000), y)
+    assert names(Hamiltonian((body,), free(body, 1, 1, 1) + angle)) == [
+        "energy",
+        "spatial_momentum.e03",
+    ]
+
+
+def test_a_tower_of_exponentials_ends_with_the_energy_alone() -> None:
+    body = body_on("pga3", "T3")
+    tower = sympy.exp(sympy.exp(sympy.exp(sympy.exp(body.position[0] + 3))))
+    system = System(Hamiltonian((body,), free(body, 1, 1, 1) + tower))
+    assert [q.name for q in conserved(system.hamiltonian, system)] == ["energy"]
+    prove_energy_balance(system)
+
+
+def test_a_large_power_is_not_multiplied_out() -> None:
+    body = body_on("pga3", "SE3")
+    many = sum(body.momenta) + sum(body.position)
+    found = conserved(Hamiltonian((body,), many**60))
+    assert [q.name for q in found] == [
+        "energy",
+        "spatial_momentum.e23_combination",
+        "spatial_momentum.e01_combination",
+        "spatial_momentum.e02_combination",
+        "body.momentum.e23_combination",
     ]

@@ -20,11 +20,18 @@ DIGITS = 100
 SAME = mpmath.mpf(10) ** -50
 """Two arguments of an absolute value that differ by less, relatively, are one."""
 MOST_ATTEMPTS = 20
+GROWING = ("exp", "sin", "cos", "tan", "sinh", "cosh", "tanh")
+MOST_ARGUMENT = 10**9
+"""Of these functions: beyond, their exact evaluation takes as many digits as the argument has."""
 
 Number = Any
 """One of mpmath's numbers: complex where a root is continued beyond its domain."""
 Functions = dict[str, Callable[..., Any]]
 """What a program may call, by name."""
+
+
+class Undefined(ValueError):
+    """H has no value in the states that were tried."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class State:
 
 
 def random_states(system: System) -> Iterator[State]:
-    """The same states in every process, without end; ValueError where H has no value.
+    """The same states in every process, without end; `Undefined` where H has no value.
 
     Momenta are scaled so that ad*_B μ and F are alike in size: neither is to be lost below the
     other. Motors are products of the generators' exponentials.
@@ -68,7 +75,7 @@ def _defined(system: System, drawn: random.Random, factors: list[Number]) -> Sta
     for _ in range(MOST_ATTEMPTS):
         with suppress(ZeroDivisionError, TypeError, ValueError):
             return _state(system, drawn, factors)
-    raise ValueError(f"H has no value in any of {MOST_ATTEMPTS} random states")
+    raise Undefined(f"H has no value in any of {MOST_ATTEMPTS} random states")
 
 
 def _state(system: System, drawn: random.Random, factors: list[Number]) -> State:
@@ -174,10 +181,28 @@ def functions(drawn: random.Random) -> Functions:
         signs.append((x, drawn.choice((-1, 1))))
         return signs[-1][1]
 
-    smooth = {name: getattr(mpmath, name) for name in FUNCTIONS.values() if hasattr(mpmath, name)}
-    return smooth | {
+    known = {name: getattr(mpmath, name) for name in FUNCTIONS.values() if hasattr(mpmath, name)}
+    return known | {
+        **{name: _bounded(known[name]) for name in GROWING},
         "sqrt": mpmath.sqrt,
+        "atan2": _angle,
         "abs": lambda x: sign(x) * x,
         "sign": sign,
         "number": real,
     }
+
+
+def _bounded(function: Callable[[Number], Number]) -> Callable[[Number], Number]:
+    def on_moderate(x: Number) -> Number:
+        if abs(x) > MOST_ARGUMENT:
+            raise ValueError("beyond what double holds")
+        return function(x)
+
+    return on_moderate
+
+
+def _angle(y: Number, x: Number) -> Number:
+    """atan2, continued to complex numbers."""
+    if isinstance(x, mpmath.mpf) and isinstance(y, mpmath.mpf):
+        return mpmath.atan2(y, x)
+    return -1j * mpmath.log((x + 1j * y) / mpmath.sqrt(x * x + y * y))
