@@ -14,6 +14,7 @@ import pytest
 
 from hamotor.codegen import bundled_algebras, read_algebra
 from hamotor.codegen.kernel import Kernel, proved
+from hamotor.codegen.lanes import packed_lines
 from hamotor.codegen.library import library
 from hamotor.codegen.program import (
     Cost,
@@ -241,3 +242,17 @@ def test_the_page_lists_every_kernel_with_its_cost() -> None:
                 f" {kernel.name}({operands})` | " in row and f" | {cost.mul} | {cost.add} | " in row
                 for row in rows
             ), kernel.name
+
+
+def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
+    packed = {
+        title(algebra, kernel): packed_lines(kernel.program)
+        for algebra, kernel in KERNELS
+        if kernel.name == "gp" and algebra in ("cga3", "pga3")
+    }
+    lines = packed["cga3 gp Even Even"]
+    assert lines is not None
+    assert sum(line.startswith("const auto sum") for line in lines) == 4
+    assert "const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);" in lines
+    assert any("four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i)" in line for line in lines)
+    assert packed["cga3 gp Vector Vector"] is None

@@ -9,6 +9,7 @@
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
 #include "hamotor/cga3/elements.hpp"
+#include "hamotor/lanes.hpp"
 
 namespace hamotor::cga3 {
 
@@ -21,6 +22,76 @@ using hamotor::select;
 /// Cost: 144 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Versor<S> gp(const Versor<S>& a, const Versor<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S a_plus_s = a.s - a.e0i;
+      const S a_minus_s = a.s + a.e0i;
+      const S a_plus_e12 = a.e12 - a.e012i;
+      const S a_minus_e12 = a.e12 + a.e012i;
+      const S a_plus_e13 = -a.e31 + a.e031i;
+      const S a_minus_e13 = -a.e31 - a.e031i;
+      const S a_plus_e23 = a.e23 - a.e023i;
+      const S a_minus_e23 = a.e23 + a.e023i;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
+      const auto sum1 =
+          dot(four(a_plus_s), four_b_plus_s, four(a_plus_e12), turned<-4, -3, 2, 1>(four_b_plus_s),
+              four(a_plus_e13), turned<-3, 4, 1, -2>(four_b_plus_s), four(a_plus_e23),
+              turned<-2, 1, -4, 3>(four_b_plus_s), four(S(2)),
+              dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
+                  turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
+                  four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i)));
+      const S plus_s = sum1[0];
+      const S plus_e23 = sum1[1];
+      const S plus_e13 = sum1[2];
+      const S plus_e12 = sum1[3];
+      const auto sum2 = dot(
+          four(a_minus_s), four_b_minus_s, four(a_minus_e12), turned<-4, -3, 2, 1>(four_b_minus_s),
+          four(a_minus_e13), turned<-3, 4, 1, -2>(four_b_minus_s), four(a_minus_e23),
+          turned<-2, 1, -4, 3>(four_b_minus_s), four(S(2)),
+          dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
+              turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
+              four(a.e123i), turned<4, -1, 2, -3>(four_b_e01)));
+      const S minus_s = sum2[0];
+      const S minus_e23 = sum2[1];
+      const S minus_e13 = sum2[2];
+      const S minus_e12 = sum2[3];
+      const auto sum3 = dot(
+          four(a.e1i), turned<1, 4, 3, 2>(four_b_plus_s), four(a.e2i),
+          turned<-4, 1, 2, -3>(four_b_plus_s), four(a.e3i), turned<-3, -2, 1, 4>(four_b_plus_s),
+          four(a.e123i), turned<-2, 3, -4, 1>(four_b_plus_s), four(a_minus_s), four_b_e1i,
+          four(a_minus_e12), turned<2, -1, -4, 3>(four_b_e1i), four(a_minus_e13),
+          turned<3, 4, -1, -2>(four_b_e1i), four(a_minus_e23), turned<-4, 3, -2, 1>(four_b_e1i));
+      const auto sum4 = dot(
+          four(a.e01), turned<1, 4, 3, 2>(four_b_minus_s), four(a.e02),
+          turned<-4, 1, 2, -3>(four_b_minus_s), four(a.e03), turned<-3, -2, 1, 4>(four_b_minus_s),
+          four(a.e0123), turned<-2, 3, -4, 1>(four_b_minus_s), four(a_plus_s), four_b_e01,
+          four(a_plus_e12), turned<2, -1, -4, 3>(four_b_e01), four(a_plus_e13),
+          turned<3, 4, -1, -2>(four_b_e01), four(a_plus_e23), turned<-4, 3, -2, 1>(four_b_e01));
+      return {.s = S(0.5) * (plus_s + minus_s),
+              .e23 = S(0.5) * (plus_e23 + minus_e23),
+              .e31 = S(-0.5) * (plus_e13 + minus_e13),
+              .e12 = S(0.5) * (plus_e12 + minus_e12),
+              .e1i = sum3[0],
+              .e2i = sum3[1],
+              .e3i = sum3[2],
+              .e123i = sum3[3],
+              .e0i = S(-0.5) * (plus_s - minus_s),
+              .e023i = S(-0.5) * (plus_e23 - minus_e23),
+              .e031i = S(0.5) * (plus_e13 - minus_e13),
+              .e012i = S(-0.5) * (plus_e12 - minus_e12),
+              .e01 = sum4[0],
+              .e02 = sum4[1],
+              .e03 = sum4[2],
+              .e0123 = sum4[3]};
+    }
+  }
   const S a_plus_s = a.s - a.e0i;
   const S a_minus_s = a.s + a.e0i;
   const S a_plus_e12 = a.e12 - a.e012i;
@@ -93,6 +164,59 @@ template <class S>
 /// Cost: 72 mul, 76 add (40 fused).  Sparsity: 128 of 144 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> gp(const Similarity<S>& a, const Similarity<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S a_plus_s = a.s - a.e0i;
+      const S a_minus_s = a.s + a.e0i;
+      const S a_plus_e12 = a.e12 - a.e012i;
+      const S a_minus_e12 = a.e12 + a.e012i;
+      const S a_plus_e13 = -a.e31 + a.e031i;
+      const S a_minus_e13 = -a.e31 - a.e031i;
+      const S a_plus_e23 = a.e23 - a.e023i;
+      const S a_minus_e23 = a.e23 + a.e023i;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto sum1 =
+          dot(four(a_plus_s), four_b_plus_s, four(a_plus_e12), turned<-4, -3, 2, 1>(four_b_plus_s),
+              four(a_plus_e13), turned<-3, 4, 1, -2>(four_b_plus_s), four(a_plus_e23),
+              turned<-2, 1, -4, 3>(four_b_plus_s));
+      const S plus_s = sum1[0];
+      const S plus_e23 = sum1[1];
+      const S plus_e13 = sum1[2];
+      const S plus_e12 = sum1[3];
+      const auto sum2 = dot(four(a_minus_s), four_b_minus_s, four(a_minus_e12),
+                            turned<-4, -3, 2, 1>(four_b_minus_s), four(a_minus_e13),
+                            turned<-3, 4, 1, -2>(four_b_minus_s), four(a_minus_e23),
+                            turned<-2, 1, -4, 3>(four_b_minus_s));
+      const S minus_s = sum2[0];
+      const S minus_e23 = sum2[1];
+      const S minus_e13 = sum2[2];
+      const S minus_e12 = sum2[3];
+      const auto sum3 = dot(
+          four(a.e1i), turned<1, 4, 3, 2>(four_b_plus_s), four(a.e2i),
+          turned<-4, 1, 2, -3>(four_b_plus_s), four(a.e3i), turned<-3, -2, 1, 4>(four_b_plus_s),
+          four(a.e123i), turned<-2, 3, -4, 1>(four_b_plus_s), four(a_minus_s), four_b_e1i,
+          four(a_minus_e12), turned<2, -1, -4, 3>(four_b_e1i), four(a_minus_e13),
+          turned<3, 4, -1, -2>(four_b_e1i), four(a_minus_e23), turned<-4, 3, -2, 1>(four_b_e1i));
+      return {.s = S(0.5) * (plus_s + minus_s),
+              .e23 = S(0.5) * (plus_e23 + minus_e23),
+              .e31 = S(-0.5) * (plus_e13 + minus_e13),
+              .e12 = S(0.5) * (plus_e12 + minus_e12),
+              .e1i = sum3[0],
+              .e2i = sum3[1],
+              .e3i = sum3[2],
+              .e123i = sum3[3],
+              .e0i = S(-0.5) * (plus_s - minus_s),
+              .e023i = S(-0.5) * (plus_e23 - minus_e23),
+              .e031i = S(0.5) * (plus_e13 - minus_e13),
+              .e012i = S(-0.5) * (plus_e12 - minus_e12)};
+    }
+  }
   const S a_plus_s = a.s - a.e0i;
   const S a_minus_s = a.s + a.e0i;
   const S a_plus_e12 = a.e12 - a.e012i;
@@ -208,6 +332,76 @@ template <class S>
 /// Cost: 144 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S a_plus_s = a.s - a.e0i;
+      const S a_minus_s = a.s + a.e0i;
+      const S a_plus_e12 = a.e12 - a.e012i;
+      const S a_minus_e12 = a.e12 + a.e012i;
+      const S a_plus_e13 = -a.e31 + a.e031i;
+      const S a_minus_e13 = -a.e31 - a.e031i;
+      const S a_plus_e23 = a.e23 - a.e023i;
+      const S a_minus_e23 = a.e23 + a.e023i;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
+      const auto sum1 =
+          dot(four(a_plus_s), four_b_plus_s, four(a_plus_e12), turned<-4, -3, 2, 1>(four_b_plus_s),
+              four(a_plus_e13), turned<-3, 4, 1, -2>(four_b_plus_s), four(a_plus_e23),
+              turned<-2, 1, -4, 3>(four_b_plus_s), four(S(2)),
+              dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
+                  turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
+                  four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i)));
+      const S plus_s = sum1[0];
+      const S plus_e23 = sum1[1];
+      const S plus_e13 = sum1[2];
+      const S plus_e12 = sum1[3];
+      const auto sum2 = dot(
+          four(a_minus_s), four_b_minus_s, four(a_minus_e12), turned<-4, -3, 2, 1>(four_b_minus_s),
+          four(a_minus_e13), turned<-3, 4, 1, -2>(four_b_minus_s), four(a_minus_e23),
+          turned<-2, 1, -4, 3>(four_b_minus_s), four(S(2)),
+          dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
+              turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
+              four(a.e123i), turned<4, -1, 2, -3>(four_b_e01)));
+      const S minus_s = sum2[0];
+      const S minus_e23 = sum2[1];
+      const S minus_e13 = sum2[2];
+      const S minus_e12 = sum2[3];
+      const auto sum3 = dot(
+          four(a.e1i), turned<1, 4, 3, 2>(four_b_plus_s), four(a.e2i),
+          turned<-4, 1, 2, -3>(four_b_plus_s), four(a.e3i), turned<-3, -2, 1, 4>(four_b_plus_s),
+          four(a.e123i), turned<-2, 3, -4, 1>(four_b_plus_s), four(a_minus_s), four_b_e1i,
+          four(a_minus_e12), turned<2, -1, -4, 3>(four_b_e1i), four(a_minus_e13),
+          turned<3, 4, -1, -2>(four_b_e1i), four(a_minus_e23), turned<-4, 3, -2, 1>(four_b_e1i));
+      const auto sum4 = dot(
+          four(a.e01), turned<1, 4, 3, 2>(four_b_minus_s), four(a.e02),
+          turned<-4, 1, 2, -3>(four_b_minus_s), four(a.e03), turned<-3, -2, 1, 4>(four_b_minus_s),
+          four(a.e0123), turned<-2, 3, -4, 1>(four_b_minus_s), four(a_plus_s), four_b_e01,
+          four(a_plus_e12), turned<2, -1, -4, 3>(four_b_e01), four(a_plus_e13),
+          turned<3, 4, -1, -2>(four_b_e01), four(a_plus_e23), turned<-4, 3, -2, 1>(four_b_e01));
+      return {.s = S(0.5) * (plus_s + minus_s),
+              .e23 = S(0.5) * (plus_e23 + minus_e23),
+              .e31 = S(-0.5) * (plus_e13 + minus_e13),
+              .e12 = S(0.5) * (plus_e12 + minus_e12),
+              .e1i = sum3[0],
+              .e2i = sum3[1],
+              .e3i = sum3[2],
+              .e123i = sum3[3],
+              .e0i = S(-0.5) * (plus_s - minus_s),
+              .e023i = S(-0.5) * (plus_e23 - minus_e23),
+              .e031i = S(0.5) * (plus_e13 - minus_e13),
+              .e012i = S(-0.5) * (plus_e12 - minus_e12),
+              .e01 = sum4[0],
+              .e02 = sum4[1],
+              .e03 = sum4[2],
+              .e0123 = sum4[3]};
+    }
+  }
   const S a_plus_s = a.s - a.e0i;
   const S a_minus_s = a.s + a.e0i;
   const S a_plus_e12 = a.e12 - a.e012i;
@@ -2602,6 +2796,58 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Versor<S> unit_correction(const Versor<S>& m,
                                                   const VersorDefect<S>& d) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S half_s = S(-0.5) * d.s;
+      const S half_e0123 = S(-0.5) * d.e0123;
+      const S half_e012i = S(-0.5) * d.e012i;
+      const S half_e013i = S(-0.5) * d.e013i;
+      const S half_e023i = S(-0.5) * d.e023i;
+      const S half_e123i = S(-0.5) * d.e123i;
+      const auto four_m_s = four(m.s, m.e23, m.e31, m.e12);
+      const auto four_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e123i);
+      const auto four_m_e0i = four(m.e0i, m.e023i, m.e031i, m.e012i);
+      const auto four_m_e01 = four(m.e01, m.e02, m.e03, m.e0123);
+      const auto sum1 =
+          dot(four(half_s), four_m_s, four(half_e0123), turned<4, -1, -2, -3>(four_m_e1i),
+              four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i), four(half_e013i),
+              turned<3, 4, -1, -2>(four_m_e0i), four(half_e023i), turned<-2, 1, 4, -3>(four_m_e0i),
+              four(half_e123i), turned<4, -1, -2, -3>(four_m_e01));
+      const auto sum2 =
+          dot(four(half_s), four_m_e0i, four(half_e0123), turned<-4, 1, 2, 3>(four_m_e1i),
+              four(half_e012i), turned<-4, 3, -2, 1>(four_m_s), four(half_e013i),
+              turned<3, 4, -1, -2>(four_m_s), four(half_e023i), turned<-2, 1, 4, -3>(four_m_s),
+              four(half_e123i), turned<4, -1, -2, -3>(four_m_e01));
+      const auto sum3 =
+          dot(four(half_s), four_m_e1i, four(half_e012i), turned<2, -1, -4, 3>(four_m_e1i),
+              four(half_e013i), turned<3, 4, -1, -2>(four_m_e1i), four(half_e023i),
+              turned<-4, 3, -2, 1>(four_m_e1i), four(half_e123i), turned<-2, -3, -4, 1>(four_m_s),
+              four(half_e123i), turned<2, 3, 4, -1>(four_m_e0i));
+      const auto sum4 =
+          dot(four(half_s), four_m_e01, four(half_e0123), turned<-2, -3, -4, 1>(four_m_s),
+              four(half_e0123), turned<-2, -3, -4, 1>(four_m_e0i), four(half_e012i),
+              turned<-2, 1, 4, -3>(four_m_e01), four(half_e013i), turned<-3, -4, 1, 2>(four_m_e01),
+              four(half_e023i), turned<4, -3, 2, -1>(four_m_e01));
+      return {.s = sum1[0],
+              .e23 = sum1[1],
+              .e31 = sum1[2],
+              .e12 = sum1[3],
+              .e1i = sum3[0],
+              .e2i = sum3[1],
+              .e3i = sum3[2],
+              .e123i = sum3[3],
+              .e0i = sum2[0],
+              .e023i = sum2[1],
+              .e031i = sum2[2],
+              .e012i = sum2[3],
+              .e01 = sum4[0],
+              .e02 = sum4[1],
+              .e03 = sum4[2],
+              .e0123 = sum4[3]};
+    }
+  }
   const S half_s = S(-0.5) * d.s;
   const S half_e0123 = S(-0.5) * d.e0123;
   const S half_e012i = S(-0.5) * d.e012i;

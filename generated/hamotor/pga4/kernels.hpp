@@ -8,6 +8,7 @@
 
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/pga4/elements.hpp"
 
 namespace hamotor::pga4 {
@@ -519,6 +520,80 @@ template <class S>
 /// Cost: 162 mul, 136 add (110 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Motor<S>& m, const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_m_s = four(m.s, m.e12, m.e13, m.e23);
+      const auto four_m_e14 = four(m.e14, m.e24, m.e34, m.e1234);
+      const auto sum1 =
+          dot(four(b.e12), turned<2, 1, -4, 3>(four_m_s), four(b.e13),
+              turned<3, 4, 1, -2>(four_m_s), four(b.e14), turned<1, 2, 3, -4>(four_m_e14),
+              four(b.e23), turned<4, -3, 2, 1>(four_m_s), four(b.e24),
+              turned<2, -1, 4, 3>(four_m_e14), four(b.e34), turned<3, -4, -1, -2>(four_m_e14));
+      const S y_s = sum1[0];
+      const S y_e12 = sum1[1];
+      const S y_e13 = sum1[2];
+      const S y_e23 = sum1[3];
+      const auto sum2 =
+          dot(four(b.e12), turned<-2, 1, -4, -3>(four_m_e14), four(b.e13),
+              turned<-3, 4, 1, 2>(four_m_e14), four(b.e14), turned<1, -2, -3, -4>(four_m_s),
+              four(b.e23), turned<-4, -3, 2, -1>(four_m_e14), four(b.e24),
+              turned<2, 1, -4, 3>(four_m_s), four(b.e34), turned<3, 4, 1, -2>(four_m_s));
+      const S y_e14 = sum2[0];
+      const S y_e24 = sum2[1];
+      const S y_e34 = sum2[2];
+      const S y_e1234 = sum2[3];
+      const auto sum3 = dot(
+          four(b.e01), turned<1, -2, -3, -4>(four_m_s), four(b.e02), turned<2, 1, -4, 3>(four_m_s),
+          four(b.e03), turned<3, 4, 1, -2>(four_m_s), four(b.e04), turned<1, 2, 3, -4>(four_m_e14));
+      const S y_e01 = sum3[0];
+      const S y_e02 = sum3[1];
+      const S y_e03 = sum3[2];
+      const S y_e0123 = sum3[3];
+      const auto sum4 =
+          dot(four(b.e01), turned<-1, -2, -3, 4>(four_m_e14), four(b.e02),
+              turned<-2, 1, -4, -3>(four_m_e14), four(b.e03), turned<-3, 4, 1, 2>(four_m_e14),
+              four(b.e04), turned<1, -2, -3, -4>(four_m_s));
+      const S y_e04 = sum4[0];
+      const S y_e0124 = sum4[1];
+      const S y_e0134 = sum4[2];
+      const S y_e0234 = sum4[3];
+      return {
+          .e12 =
+              mul_add(S(2), dot(-m.e13, y_e23, -m.e14, y_e24, m.e23, y_e13, m.e24, y_e14), b.e12),
+          .e13 =
+              mul_add(S(2), dot(m.e12, y_e23, -m.e14, y_e34, -m.e23, y_e12, m.e34, y_e14), b.e13),
+          .e14 =
+              mul_add(S(2), dot(m.e12, y_e24, m.e13, y_e34, -m.e24, y_e12, -m.e34, y_e13), b.e14),
+          .e23 =
+              mul_add(S(2), dot(-m.e12, y_e13, m.e13, y_e12, -m.e24, y_e34, m.e34, y_e24), b.e23),
+          .e24 =
+              mul_add(S(2), dot(-m.e12, y_e14, m.e14, y_e12, m.e23, y_e34, -m.e34, y_e23), b.e24),
+          .e34 =
+              mul_add(S(2), dot(-m.e13, y_e14, m.e14, y_e13, -m.e23, y_e24, m.e24, y_e23), b.e34),
+          .e01 = mul_add(S(2),
+                         dot(m.e12, y_e02, m.e13, y_e03, m.e14, y_e04, -m.e1234, y_e0234, m.e01,
+                             y_s, -m.e02, y_e12, -m.e03, y_e13, -m.e04, y_e14, -m.e0123, y_e23,
+                             -m.e0124, y_e24, -m.e0134, y_e34, m.e0234, y_e1234),
+                         b.e01),
+          .e02 = mul_add(S(2),
+                         dot(-m.e12, y_e01, m.e23, y_e03, m.e24, y_e04, m.e1234, y_e0134, m.e01,
+                             y_e12, m.e02, y_s, -m.e03, y_e23, -m.e04, y_e24, m.e0123, y_e13,
+                             m.e0124, y_e14, -m.e0134, y_e1234, -m.e0234, y_e34),
+                         b.e02),
+          .e03 = mul_add(S(2),
+                         dot(-m.e13, y_e01, -m.e23, y_e02, m.e34, y_e04, -m.e1234, y_e0124, m.e01,
+                             y_e13, m.e02, y_e23, m.e03, y_s, -m.e04, y_e34, -m.e0123, y_e12,
+                             m.e0124, y_e1234, m.e0134, y_e14, m.e0234, y_e24),
+                         b.e03),
+          .e04 = mul_add(S(2),
+                         dot(-m.e14, y_e01, -m.e24, y_e02, -m.e34, y_e03, m.e1234, y_e0123, m.e01,
+                             y_e14, m.e02, y_e24, m.e03, y_e34, m.e04, y_s, -m.e0123, y_e1234,
+                             -m.e0124, y_e12, -m.e0134, y_e13, -m.e0234, y_e23),
+                         b.e04)};
+    }
+  }
   const S y_s =
       dot(b.e12, m.e12, b.e13, m.e13, b.e14, m.e14, b.e23, m.e23, b.e24, m.e24, b.e34, m.e34);
   const S y_e01 = dot(b.e01, m.s, b.e02, m.e12, b.e03, m.e13, b.e04, m.e14);

@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hamotor.codegen import cpp
+from hamotor.codegen import cpp, lanes
 from hamotor.codegen.algebra import Algebra, Blade
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
@@ -33,6 +33,7 @@ INLINED_OPERATIONS = 128
 """Kernels of at most so many additions, multiplications and divisions are always inlined: for
 them the way of a result through memory costs more than the arithmetic.  Kernels that call
 functions of the runtime are longer than their count."""
+PACKED = "if constexpr (lanes::packed<S>) {"
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
     "bivector_logarithm": "hamotor/bivector_logarithm.hpp",
@@ -201,8 +202,25 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
         "sparsity": sparsity,
         "attributes": "[[nodiscard]]" + " HAMOTOR_INLINE" * inlined,
         "signature": cpp.signature_text(kernel.name, kernel.program),
-        "body": cpp.body_lines(kernel.program),
+        "body": [*_packed_body(kernel), *cpp.body_lines(kernel.program)],
     }
+
+
+def _packed_body(kernel: Kernel) -> list[str]:
+    """What a long kernel does first, where the scalar and the processor allow it."""
+    cost = kernel.program.cost
+    packed = lanes.packed_lines(kernel.program) if cost.total > INLINED_OPERATIONS else None
+    if packed is None or cost.calls:
+        return []
+    return [
+        PACKED,
+        "if (!std::is_constant_evaluated()) {",
+        "using lanes::four;",
+        "using lanes::turned;",
+        *packed,
+        "}",
+        "}",
+    ]
 
 
 def _kernels_file(
@@ -216,13 +234,15 @@ def _kernels_file(
     template = "kernels.hpp.jinja"
     needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
     found = {RUNTIME_HEADERS[f]: None for f in sorted(needed) if f in RUNTIME_HEADERS}
-    includes = [*includes, *found]
+    data = [kernel_data(k) for k in kernels]
+    packed = ["hamotor/lanes.hpp"] if any(PACKED in k["body"] for k in data) else []
+    includes = [*includes, *found, *packed]
     text = render(
         template,
         banner=_banner(spec, template, "Kernels: unrolled, sparse, for any scalar type S."),
         namespace=f"hamotor::{spec.name}" + (f"::{namespace}" if namespace else ""),
         includes=list(includes),
-        kernels=[kernel_data(k) for k in kernels],
+        kernels=data,
         extra=[],
     )
     return SourceFile(f"{folder}/{file}.hpp", text)

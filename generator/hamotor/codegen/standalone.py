@@ -14,6 +14,7 @@ from hamotor.codegen.spec import AlgebraSpec
 RUNTIME = Path(__file__).resolve().parents[3] / "runtime" / "include"
 RUNTIME_HEADERS = (
     "hamotor/scalar.hpp",
+    "hamotor/lanes.hpp",
     "hamotor/bivector_exponential.hpp",
     "hamotor/bivector_logarithm.hpp",
     "hamotor/rate_jacobian.hpp",

@@ -1,0 +1,87 @@
+// Four numbers at a time, within one object: for kernels that are sums of products over groups of
+// four components.  Lane by lane the same operations as `dot` on scalars, and so the same bits.
+#pragma once
+
+#include <type_traits>
+
+#include "hamotor/scalar.hpp"
+
+#if defined(__FMA__) && defined(__x86_64__) && defined(__GNUC__)
+#define HAMOTOR_LANES 1
+#include <immintrin.h>
+#endif
+
+namespace hamotor::lanes {
+
+#ifdef HAMOTOR_LANES
+
+/// Whether kernels compute with this scalar four at a time.
+template <class S>
+inline constexpr bool packed = std::is_same_v<S, double> || std::is_same_v<S, float>;
+
+/// Four numbers.
+template <class S>
+struct Four {
+  using Lanes [[gnu::vector_size(4 * sizeof(S))]] = S;
+  Lanes lanes;
+
+  [[nodiscard]] HAMOTOR_INLINE S operator[](int lane) const noexcept { return lanes[lane]; }
+  [[nodiscard]] HAMOTOR_INLINE friend Four operator+(const Four& a, const Four& b) noexcept {
+    return {a.lanes + b.lanes};
+  }
+  [[nodiscard]] HAMOTOR_INLINE friend Four operator*(const Four& a, const Four& b) noexcept {
+    return {a.lanes * b.lanes};
+  }
+};
+
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> four(const S& x) noexcept {
+  return {typename Four<S>::Lanes{x, x, x, x}};
+}
+
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> four(const S& a, const S& b, const S& c,
+                                                 const S& d) noexcept {
+  return {typename Four<S>::Lanes{a, b, c, d}};
+}
+
+[[nodiscard]] HAMOTOR_INLINE inline Four<double> mul_add(const Four<double>& a,
+                                                         const Four<double>& b,
+                                                         const Four<double>& c) noexcept {
+  return {_mm256_fmadd_pd(a.lanes, b.lanes, c.lanes)};
+}
+
+[[nodiscard]] HAMOTOR_INLINE inline Four<float> mul_add(const Four<float>& a, const Four<float>& b,
+                                                        const Four<float>& c) noexcept {
+  return {_mm_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+}
+
+/// Lanes in another order and with other signs: −2 is the second lane, negated.
+template <int a, int b, int c, int d, class S>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> turned(const Four<S>& x) noexcept {
+  constexpr auto lane = [](int k) { return (k < 0 ? -k : k) - 1; };
+  constexpr auto sign = [](int k) { return k < 0 ? S(-0.0) : S(0); };
+  const typename Four<S>::Lanes moved =
+      __builtin_shufflevector(x.lanes, x.lanes, lane(a), lane(b), lane(c), lane(d));
+  if constexpr (a > 0 && b > 0 && c > 0 && d > 0) {
+    return {moved};
+  } else if constexpr (std::is_same_v<S, double>) {
+    return {_mm256_xor_pd(moved, _mm256_setr_pd(sign(a), sign(b), sign(c), sign(d)))};
+  } else {
+    return {_mm_xor_ps(moved, _mm_setr_ps(sign(a), sign(b), sign(c), sign(d)))};
+  }
+}
+
+#else
+
+template <class S>
+inline constexpr bool packed = false;
+
+template <class S, class... Rest>
+[[nodiscard]] S four(const S& x, const Rest&... rest) noexcept;
+template <int a, int b, int c, int d, class S>
+[[nodiscard]] S turned(const S& x) noexcept;
+
+#endif
+
+}  // namespace hamotor::lanes
