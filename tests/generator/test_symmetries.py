@@ -81,7 +81,9 @@ CONSERVED: dict[str, list[str]] = {
 
 @pytest.mark.parametrize("name", CONSERVED)
 def test_conserved_quantities_are_those_of_the_textbook(name: str) -> None:
-    assert names(HAMILTONIANS[name]()) == CONSERVED[name]
+    found = conserved(HAMILTONIANS[name]())
+    assert [q.name for q in found] == CONSERVED[name]
+    assert all(q.proved for q in found)
 
 
 def test_the_momentum_about_the_axis_of_a_dipole_field_is_kept() -> None:

@@ -52,11 +52,9 @@ class Hamiltonian:
         return tuple(self._forque(body) for body in self.bodies)
 
     def _forque(self, body: Coordinates) -> tuple[Expr, ...]:
+        slopes = self.slopes(body)
         total = [
-            sum(
-                (slope * v.variation[i] for v, slope in self.slopes(body)),
-                sympy.Integer(0),
-            )
+            sympy.Add(*(slope * v.variation[i] for v, slope in slopes))
             for i in range(len(body.momenta))
         ]
         for point, gradient in self.gradients(body):
@@ -84,23 +82,18 @@ class Hamiltonian:
     @cached_property
     def spatial_forques(self) -> tuple[tuple[Expr, ...], ...]:
         """F_s = dH along exp(εE_i) M, of each body; without what is applied."""
-        return tuple(
-            tuple(
-                sum(
-                    (slope * v.spatial_variation[i] for v, slope in self.slopes(body)),
-                    sympy.Integer(0),
-                )
-                + sum(
-                    v * g
-                    for point, gradient in self.gradients(body)
-                    for v, g in zip(
-                        body.world_velocities_at(point.symbols)[i], gradient, strict=True
-                    )
-                )
-                for i in range(len(body.momenta))
-            )
-            for body in self.bodies
-        )
+        return tuple(self._spatial_forque(body) for body in self.bodies)
+
+    def _spatial_forque(self, body: Coordinates) -> tuple[Expr, ...]:
+        slopes = self.slopes(body)
+        total = [
+            sympy.Add(*(slope * v.spatial_variation[i] for v, slope in slopes))
+            for i in range(len(body.momenta))
+        ]
+        for point, gradient in self.gradients(body):
+            for i, velocity in enumerate(body.world_velocities_at(point.symbols)):
+                total[i] += sum(v * g for v, g in zip(velocity, gradient, strict=True))
+        return tuple(total)
 
     @property
     def all_forques(self) -> tuple[tuple[Expr, ...], ...]:
