@@ -6,16 +6,18 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from hamotor.errors import UsageError
-from hamotor.run.build import CompiledScene, compile_scene
+from hamotor.run.build import CompiledScene, compile_scene, default_cache
 from hamotor.run.dataset import DiskRecorder, MemoryRecorder, RunFolder
 from hamotor.run.library import Description, SceneLibrary, Vector, check_method
 from hamotor.run.progress import NoProgress, PrintedProgress, Progress
+from hamotor.run.remembered import Remembered, key_of
 from hamotor.run.report import Origin, report, to_json
 from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
 from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, meet_tolerance, plan
@@ -40,7 +42,7 @@ class Simulation:
 
     `source` gives the scene's C++ text for (kernels, scalar); `state` is the initial state, per
     body motor and momentum, in the scene's body frame.  Times are in seconds.  `methods`, if given,
-    are all that a scene may ask for.
+    are all that a scene may ask for.  `read` gives the scene that it was made from.
     """
 
     name: str
@@ -53,7 +55,7 @@ class Simulation:
     every: int
     spec_hash: str
     methods: tuple[str, ...] = ()
-    scene: Scene | GeneralScene | None = None
+    read: Callable[[], Scene | GeneralScene] | None = None
 
     def compile(
         self,
@@ -232,21 +234,35 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
     Raises UsageError for an unknown name or a mistake in the file, naming file and key.
     """
-    from hamotor.scene import METHODS, read_scene, scene_source
+    from hamotor.scene import METHODS, find_scene, parse_scene, scene_source
 
-    read = read_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
+    contents, name, file = find_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
+    kept = Remembered(default_cache(), key_of(contents, name))
+
+    @cache
+    def read() -> Scene | GeneralScene:
+        return parse_scene(contents, name=name, file=file)
+
+    def settings() -> dict[str, Any]:
+        found = read()
+        return {
+            "name": found.name,
+            "state": list(map(float, found.initial_state)),
+            "end": found.time.end,
+            "step": found.time.step,
+            "tolerance": found.time.tolerance,
+            "method": found.time.method,
+            "every": found.output.every,
+            "spec_hash": found.sha256,
+        }
+
+    def source(*choice: str) -> str:
+        text = kept.value(f"source {' '.join(choice)}", lambda: scene_source(read(), *choice))
+        return str(text)
+
+    known = kept.value("settings", settings)
     return Simulation(
-        name=read.name,
-        source=lambda kernels, scalar: scene_source(read, kernels=kernels, scalar=scalar),
-        state=np.asarray(read.initial_state, dtype=np.float64),
-        end=read.time.end,
-        step=read.time.step,
-        tolerance=read.time.tolerance,
-        method=read.time.method,
-        every=read.output.every,
-        spec_hash=read.sha256,
-        methods=METHODS,
-        scene=read,
+        **{**known, "state": np.array(known["state"])}, source=source, methods=METHODS, read=read
     )
 
 

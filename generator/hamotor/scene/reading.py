@@ -49,6 +49,12 @@ def read_scene(scene: str | os.PathLike[str]) -> Scene | GeneralScene:
     A bundled scene's name comes first; write ./NAME for a file that is called the same. UsageError
     for anything unreadable, larger than 1 MiB, not UTF-8, not TOML, or wrong.
     """
+    contents, name, file = find_scene(scene)
+    return parse_scene(contents, name=name, file=file)
+
+
+def find_scene(scene: str | os.PathLike[str]) -> tuple[bytes, str, str]:
+    """The bytes of a scene's file, its stem, and how messages call it; as `read_scene`."""
     shown = os.fspath(scene)
     path, missing = Path(shown), "there is no such file"
     if isinstance(scene, str) and re.fullmatch(schema.NAME_PATTERN, scene):
@@ -61,7 +67,7 @@ def read_scene(scene: str | os.PathLike[str]) -> Scene | GeneralScene:
                 f" {listed(bundled)}.{suggest(scene, bundled)}"
             )
     shown = shown if shown.isprintable() and len(shown) < MOST_SHOWN else quoted(shown)
-    return parse_scene(_contents(path, shown, missing), name=path.stem, file=shown)
+    return _contents(path, shown, missing), path.stem, shown
 
 
 def _contents(path: Path, shown: str, missing: str) -> bytes:
