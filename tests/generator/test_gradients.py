@@ -131,6 +131,18 @@ def test_autonomous_hamiltonians_conserve_the_energy(name: str) -> None:
     assert hamiltonian.power == 0
 
 
+def test_exponential_of_a_sum_of_commuting_planes_is_the_product_of_theirs() -> None:
+    algebra = body_on("pga4", "SO4").algebra
+    (e12, _), (e34, _) = (algebra.parse_blade(name) for name in ("e12", "e34"))
+    with mpmath.workdps(100):
+        a = mpmath.mpf(7) / 11
+        whole = exponential(algebra, {e12: 1, e34: 1}, a)
+        expected: Any = {0: mpmath.cos(a), e12: mpmath.sin(a)}
+        expected = algebra.multiply(expected, {0: mpmath.cos(a), e34: mpmath.sin(a)})
+        assert set(whole) == set(expected)
+        assert largest(whole[blade] - x for blade, x in expected.items()) < mpmath.mpf(10) ** -95
+
+
 class Fast(Hamiltonian):
     """One rate too large by a billionth."""
 
