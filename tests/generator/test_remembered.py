@@ -31,9 +31,13 @@ def test_another_text_another_name_or_another_generator_is_another_key(
     (tmp_path / "a.py").write_text("1", encoding="utf-8")
     monkeypatch.setattr(remembered, "DERIVING", (tmp_path,))
     monkeypatch.setattr(remembered, "GENERATOR", tmp_path / "generator")
-    keys = {key_of(b"x", "one"), key_of(b"y", "one"), key_of(b"x", "two")}
+    keys = {
+        key_of(b"x", "one", tmp_path),
+        key_of(b"y", "one", tmp_path),
+        key_of(b"x", "two", tmp_path),
+    }
     (tmp_path / "a.py").write_text("12", encoding="utf-8")
-    assert len(keys | {key_of(b"x", "one")}) == 4
+    assert len(keys | {key_of(b"x", "one", tmp_path)}) == 4
 
 
 def test_a_damaged_cache_is_no_error(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import hamotor
 from hamotor.codegen.spec import Request
 from hamotor.errors import UsageError
 from hamotor.scene.algebra import scene_algebra
@@ -149,7 +150,7 @@ def test_a_bundled_algebra_needs_no_headers() -> None:
     ("old", "new", "message"),
     [
         ('"joints"', '"pga3"', '"name" = "pga3" is taken'),
-        ('"joints"', '"scalar"', '"name" = "scalar" is taken'),
+        ('"joints"', '"scalar"', '"name" = "scalar" is a name that generated code'),
         ('"pga3"', '"pga5"', 'extends: unknown algebra "pga5".*Did you mean'),
         ('extends = "pga3"', 'extends = "pga3"\nbasis = ["e1"]', "basis: is that of pga3, which"),
         ("{ e01 =", "{ e31 =", "SE2R is not closed: the bracket of e12 and e01 has parts along"),
@@ -160,7 +161,7 @@ def test_a_bundled_algebra_needs_no_headers() -> None:
             (
                 '[element.Part]\nsymbol = "m"\ndoc = "No e23, no e31."\nunit = true\n'
                 'blades = ["s", "e12", "e01", "e02", "e03", "e0123"]\n[[group]]\n'
-                'name = "C"\ndescription = "c"\nelement = "Part"\n'
+                'name = "Cylinder"\ndescription = "c"\nelement = "Part"\n'
                 'generators = [{ name = "a", bivector = { e12 = 1 }, rate = "w", momentum = "l" },'
                 '{ name = "b", bivector = { e03 = 1 }, rate = "v", momentum = "p" }]\n[[group]]'
             ),
@@ -182,3 +183,28 @@ def test_an_algebra_without_groups_is_refused(tmp_path: Path) -> None:
     path = write(tmp_path, JOINTS.split("[[group]]", maxsplit=1)[0])
     with pytest.raises(UsageError, match="has no group, so that nothing can move"):
         scene_algebra(path)
+
+
+def test_a_scene_lives_on_a_group_of_its_own(tmp_path: Path) -> None:
+    """A shaft that spins freely and slides on a spring."""
+    (tmp_path / "axial.toml").write_text(
+        'name = "axial"\nextends = "pga3"\ndescription = "about and along one axis"\n'
+        '[[group]]\nname = "Cylinder"\ndescription = "turning about and sliding along e3"\n'
+        'element = "Motor"\ngenerators = [\n'
+        '  { name = "e12", bivector = { e12 = "-1/2" }, rate = "w12", momentum = "l12" },\n'
+        '  { name = "e03", bivector = { e03 = "-1/2" }, rate = "v3", momentum = "p3" },\n]\n',
+        encoding="utf-8",
+    )
+    scene = tmp_path / "shaft.toml"
+    scene.write_text(
+        'algebra = "axial.toml"\n[[body]]\nname = "shaft"\nmass = 2\n'
+        "inertia = [1, 1, 0.5]\nposition = [0, 0, 1]\nrate = { e12 = 3 }\n"
+        '[[interaction]]\ntype = "potential"\nexpression = "k/2*position.z^2"\n'
+        "parameters = { k = 8 }\n[time]\nend = 1\nstep = 0.001\n",
+        encoding="utf-8",
+    )
+    run = hamotor.load(scene).run()
+    last = run.report["final"]["shaft"]
+    assert last["position"] == pytest.approx([0, 0, math.cos(2)], abs=1e-11)
+    assert last["rotation"][0] == pytest.approx([math.cos(3), -math.sin(3), 0], abs=1e-11)
+    assert "spatial_momentum.e12" in run.report["conserved"]

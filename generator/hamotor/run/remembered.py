@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -24,11 +25,17 @@ DERIVING = (
 MOST_KEPT = 200
 
 
-def key_of(contents: bytes, name: str) -> str:
-    """Where a scene of this text and name is kept."""
+_OWN_ALGEBRA = re.compile(rb"""^\s*algebra\s*=\s*["']([^"'\n]+\.toml)["']""", re.MULTILINE)
+
+
+def key_of(contents: bytes, name: str, folder: Path) -> str:
+    """Where a scene of this text and name is kept; `folder` is where its file lies."""
     digest = hashlib.sha256(b"%d\0" % len(contents) + contents + name.encode())
-    for folder in DERIVING:
-        for path in sorted(folder.rglob("*")):
+    if own := _OWN_ALGEBRA.search(contents):
+        with suppress(OSError, ValueError):
+            digest.update((folder / own[1].decode()).read_bytes())
+    for deriving in DERIVING:
+        for path in sorted(deriving.rglob("*")):
             if path.suffix in {".py", ".toml", ".jinja"}:
                 status = path.stat()
                 place = path.relative_to(GENERATOR.parent).as_posix()

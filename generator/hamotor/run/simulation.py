@@ -234,14 +234,14 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
     Raises UsageError for an unknown name or a mistake in the file, naming file and key.
     """
-    from hamotor.scene import METHODS, find_scene, parse_scene, scene_source
+    from hamotor.scene import METHODS, find_scene, folder_of, parse_scene, scene_source
 
     contents, name, file = find_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
-    kept = Remembered(default_cache(), key_of(contents, name))
+    kept = Remembered(default_cache(), key_of(contents, name, folder_of(scene)))
 
     @cache
     def read() -> Scene | GeneralScene:
-        return parse_scene(contents, name=name, file=file)
+        return parse_scene(contents, name=name, file=file, folder=folder_of(scene))
 
     def settings() -> dict[str, Any]:
         found = read()

@@ -6,7 +6,7 @@ from hamotor.scene.groups import GROUPS, Group
 from hamotor.scene.interactions import Gravity, Interaction, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.principal import PrincipalFrame
-from hamotor.scene.reading import bundled_scenes, find_scene, parse_scene, read_scene
+from hamotor.scene.reading import bundled_scenes, find_scene, folder_of, parse_scene, read_scene
 from hamotor.scene.schema import METHODS, scene_reference, starter_scene
 from hamotor.scene.source import scene_source
 
@@ -26,6 +26,7 @@ __all__ = [
     "Time",
     "bundled_scenes",
     "find_scene",
+    "folder_of",
     "parse_scene",
     "read_scene",
     "scene_reference",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +14,6 @@ from hamotor.scene.groups import Group, bundled_groups, groups_in
 if TYPE_CHECKING:
     from hamotor.codegen.compiler import SourceFile
     from hamotor.codegen.spec import AlgebraSpec, Request
-
-RESERVED = frozenset({"detail", "scalar"})
-"""Names of the runtime's own parts."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ def scene_algebra(where: str | Path, requests: Sequence[Request] = ()) -> SceneA
     if not str(where).endswith(".toml"):
         return SceneAlgebra(bundled_algebra(str(where)), bundled_groups(str(where)), ())
     spec = read_algebra(Path(where))
-    if spec.name in bundled_algebras() or spec.name in RESERVED:
+    if spec.name in bundled_algebras():
         raise UsageError(f'{spec.file}: "name" = "{spec.name}" is taken; choose another')
     if not spec.groups:
         raise UsageError(f"{spec.file}: has no group, so that nothing can move; add a [[group]]")
@@ -61,3 +59,27 @@ def stepping_headers(spec: AlgebraSpec, requests: Sequence[Request] = ()) -> tup
     elements = {name: element for name, element in spec.elements.items() if name in used}
     small = replace(spec, elements=elements, requests=tuple(requests))
     return tuple(f for f in compile_algebra(small) if f.path.endswith(".hpp"))
+
+
+def in_one_text(headers: Sequence[SourceFile]) -> tuple[str, ...]:
+    """The headers' texts, without each other's includes, in an order for one file."""
+    texts = {header.path: header.text for header in headers}
+    includes = re.compile(r'^#include "([^"]+)"\n', re.MULTILINE)
+    done: list[str] = []
+
+    def add(path: str) -> None:
+        if path in done:
+            return
+        for needed in includes.findall(texts[path]):
+            if needed in texts:
+                add(needed)
+        done.append(path)
+
+    for path in texts:
+        add(path)
+
+    def without_own_includes(text: str) -> str:
+        kept = includes.sub(lambda found: "" if found[1] in texts else found[0], text)
+        return kept.replace("#pragma once\n", "")
+
+    return tuple(without_own_includes(texts[path]) for path in done)

@@ -77,6 +77,8 @@ class GeneralScene:
     time: Time
     output: Output
     sha256: str
+    headers: tuple[str, ...] = ()
+    """Texts of the headers of an algebra of the user's own."""
 
     @cached_property
     def initial_state(self) -> NDArray[np.float64]:
@@ -118,35 +120,42 @@ def product(algebra: Algebra, a: Mapping[int, float], b: Mapping[int, float]) ->
 
 def motor_of(
     coordinates: Coordinates, position: Sequence[float], rotor: Sequence[float], scale: float
-) -> Vector:
-    """M = T(x) R S(s) (theory.md §1); the rotor as (s, e23, e31, e12), in the plane (s, e12)."""
-    algebra, group = coordinates.algebra, coordinates.group
-    space = coordinates.space
+) -> Vector | None:
+    """M = T(x) R S(s) (theory.md §1); the rotor as (s, e23, e31, e12), in the plane (s, e12).
+
+    None where the group does not reach that place.
+    """
+    algebra, space = coordinates.algebra, coordinates.space
     planes = ("e12",) if len(rotor) == 2 else ("e23", "e31", "e12")
     turned: dict[int, float] = {0: rotor[0]}
     for name, x in zip(planes, rotor[1:], strict=True):
         blade, sign = algebra.parse_blade(name)
         turned[blade] = sign * x
     moved: dict[int, float] = {0: 1.0}
+    if space.origin is not None:
+        # T = 1 − ½ x_i e0∧e_i, in the null basis 1 − ½ x_i e_i∧e∞.
+        other = space.origin if space.at_infinity is None else space.at_infinity
+        for direction, x in zip(space.directions, position, strict=False):
+            moved[1 << direction | 1 << other] = -0.5 * x
     grown: dict[int, float] = {0: 1.0}
-    for generator, velocity, growth in zip(
-        group.generators, space.velocities, space.growths, strict=True
-    ):
-        for blade, coefficient in generator.bivector.items():
-            x = float(coefficient)
-            for j, v in enumerate(velocity):
-                if v and not growth:
-                    moved[blade] = moved.get(blade, 0.0) + x / float(v) * position[j]
-            if growth and space.affine:
-                # E is ½ e0∧e∞, which squares to ¼: exp(ln s E) = cosh(½ ln s) + 2 E sinh(½ ln s).
-                half = math.log(scale) / (2 * float(growth))
-                grown[0] = math.cosh(half)
-                grown[blade] = 2 * x * math.sinh(half)
+    if space.origin is not None and space.at_infinity is not None:
+        # S = exp(½ ln s e0∧e∞), whose square is 1.
+        half = math.log(scale) / 2
+        grown = {
+            0: math.cosh(half),
+            1 << space.origin | 1 << space.at_infinity: math.sinh(half),
+        }
     whole = product(algebra, product(algebra, moved, turned), grown)
-    return tuple(
+    element = coordinates.group.element
+    motor = tuple(
         math.fsum(float(x) * whole.get(blade, 0.0) for blade, x in reading.items()) + 0.0
-        for reading in group.element.reading
+        for reading in element.reading
     )
+    for x, component in zip(motor, element.components, strict=True):
+        for blade, y in component.embedding.items():
+            whole[blade] = whole.get(blade, 0.0) - x * float(y)
+    size = max(1.0, *map(abs, motor))
+    return motor if max(map(abs, whole.values())) <= 1e-12 * size else None
 
 
 def unit_deviation(coordinates: Coordinates, motor: Sequence[float]) -> float:

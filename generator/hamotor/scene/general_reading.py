@@ -98,6 +98,7 @@ def read_general(
     algebra: Algebra,
     group: LieGroup,
     contents: bytes,
+    headers: tuple[str, ...],
     bodies: Sequence[Mapping[str, Any]],
     acting: Sequence[Mapping[str, Any]],
     orientation: Callable[[Table], tuple[float, ...]],
@@ -150,6 +151,7 @@ def read_general(
         time=time,
         output=output,
         sha256=hashlib.sha256(contents).hexdigest(),
+        headers=headers,
     )
 
 
@@ -261,14 +263,17 @@ def _motor(
         if (deviation := unit_deviation(body, motor)) > UNIT_TOLERANCE:
             table.fail(f"must be unit, but M M~ differs from 1 by {deviation:.3g}", "motor")
         return motor
-    if table.group.dimension not in (2, 3) or "s" not in names:
-        for key in ("position", "orientation"):
-            if table.has(key) and (key != "position" or table.group.translates):
-                table.fail(f'{table.group.name}: give "motor" instead of "{key}"')
-        return tuple(1.0 if name == "s" else 0.0 for name in names)
-    position = table.vector("position") if table.group.translates else ()
+    translates = table.group.translates
+    position = table.vector("position") if translates else ()
     scale = table.number("scale") if table.group.scales else 1.0
-    return motor_of(body, position, orientation(table), scale)
+    turns = table.group.dimension in {2, 3}
+    if not turns and (table.has("orientation") or any(position)):
+        table.fail(f'{table.group.name}: give "motor" instead of position and orientation')
+    rotor = orientation(table) if turns else (1.0, 0.0, 0.0, 0.0)
+    found = motor_of(body, position, rotor, scale)
+    if found is None:
+        table.fail(f"{table.group.name} does not reach this position and orientation")
+    return found
 
 
 def _parameters(table: Table, system: _System, reserved: str) -> dict[str, Any]:

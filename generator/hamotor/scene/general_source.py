@@ -83,6 +83,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         scene=scene,
         kernels=kernels,
         scalar=scalar.replace("_", " "),
+        headers=scene.headers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,
         group=scene.group.name,

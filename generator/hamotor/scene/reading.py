@@ -14,11 +14,11 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hamotor.codegen.spec import bundled_algebra, bundled_algebras
+from hamotor.codegen.spec import bundled_algebras
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
 from hamotor.scene.general import GeneralScene
-from hamotor.scene.groups import ALGEBRAS, bundled_groups, groups_of
+from hamotor.scene.groups import ALGEBRAS, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
@@ -50,7 +50,13 @@ def read_scene(scene: str | os.PathLike[str]) -> Scene | GeneralScene:
     for anything unreadable, larger than 1 MiB, not UTF-8, not TOML, or wrong.
     """
     contents, name, file = find_scene(scene)
-    return parse_scene(contents, name=name, file=file)
+    return parse_scene(contents, name=name, file=file, folder=folder_of(scene))
+
+
+def folder_of(scene: str | os.PathLike[str]) -> Path:
+    """Where a scene's file lies: what it names is sought there."""
+    bundled = isinstance(scene, str) and (BUNDLED / f"{scene}.toml").is_file()
+    return BUNDLED if bundled else Path(scene).parent
 
 
 def find_scene(scene: str | os.PathLike[str]) -> tuple[bytes, str, str]:
@@ -98,16 +104,18 @@ def _contents(path: Path, shown: str, missing: str) -> bytes:
     return contents
 
 
-def parse_scene(contents: bytes, *, name: str, file: str) -> Scene | GeneralScene:
-    """The scene that a TOML file holds; `file` is how messages call it.
+def parse_scene(
+    contents: bytes, *, name: str, file: str, folder: Path = Path()
+) -> Scene | GeneralScene:
+    """The scene that a TOML file in `folder` holds; `file` is how messages call it.
 
     `name` becomes the scene's, with every character that a name cannot have as an underscore.
     """
     values = _toml(contents, file)
     top = Table(file, "", values, schema.SCENE, groups_of(ALGEBRAS[0])[0])
-    algebra = top.choice("algebra", bundled_algebras(), "algebras")
+    algebra = _algebra(top)
     if _is_general(top, algebra):
-        return _general(top, algebra, name, contents)
+        return _general(top, algebra, name, contents, folder)
     groups = {group.name: group for group in groups_of(algebra)}
     group = next(iter(groups.values()))
     if top.has("group"):
@@ -125,7 +133,7 @@ def parse_scene(contents: bytes, *, name: str, file: str) -> Scene | GeneralScen
         time=_time(top.table("time", schema.TIME, heading=True)),
         output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
         sha256=hashlib.sha256(contents).hexdigest(),
-        reread=lambda: _general(top, algebra, name, contents),
+        reread=lambda: _general(top, algebra, name, contents, folder),
     )
     if scene.potential is not None and not scene.general.hamiltonian.autonomous:
         return scene.general
@@ -162,15 +170,25 @@ def _is_general(top: Table, algebra: str) -> bool:
     )
 
 
-def _general(top: Table, algebra: str, name: str, contents: bytes) -> GeneralScene:
+def _algebra(top: Table) -> str:
+    """The name of a bundled algebra, or of a spec file beside the scene."""
+    given = top.values.get("algebra")
+    if isinstance(given, str) and given.endswith(".toml"):
+        return given
+    return top.choice("algebra", bundled_algebras(), "algebras")
+
+
+def _general(top: Table, algebra: str, name: str, contents: bytes, folder: Path) -> GeneralScene:
+    from hamotor.scene.algebra import in_one_text, scene_algebra
     from hamotor.scene.general_reading import read_general
 
-    spec = bundled_algebra(algebra)
+    found = scene_algebra(folder / algebra if algebra.endswith(".toml") else algebra)
+    spec = found.spec
     groups = {group.name: group for group in spec.groups}
     chosen = next(iter(groups))
     if top.has("group"):
         chosen = top.choice("group", list(groups), f"groups of {algebra}")
-    view = next(group for group in bundled_groups(algebra) if group.name == chosen)
+    view = next(group for group in found.groups if group.name == chosen)
     top = Table(top.file, "", top.values, schema.SCENE, view)
     top.refuse_unknown_keys()
     limits = top.table("limits", schema.LIMITS, heading=True)
@@ -192,6 +210,7 @@ def _general(top: Table, algebra: str, name: str, contents: bytes) -> GeneralSce
         algebra=spec.algebra,
         group=groups[chosen],
         contents=contents,
+        headers=in_one_text(found.headers),
         bodies=counted[0],
         acting=counted[1],
         orientation=_orientation,
