@@ -135,11 +135,13 @@ def outputs_for(
 ) -> tuple[tuple[str, Expression], ...]:
     """The components of the result, read off blade coefficients.
 
-    Raises ValueError where the result has no place for one of them.
+    A rate has no place for what no element of its group has: those coefficients are zero there.
+    Raises ValueError where another result has no place for one of them.
     """
-    if any(blade not in result.blades for blade in values):
+    held = {blade: x for blade, x in values.items() if blade in result.blades}
+    if len(held) < len(values) and not result.namespace:
         raise ValueError(f"{result.name} does not hold all grades and blades of the result")
-    names: PolynomialMultivector = {b: {(f"{b}",): 1} for b in values}
+    names: PolynomialMultivector = {b: {(f"{b}",): 1} for b in held}
     outputs: list[tuple[str, Expression]] = []
     for component, p in read_off(names, result).items():
         total: Expression | None = None
