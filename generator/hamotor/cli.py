@@ -204,7 +204,12 @@ def _add_run(parser: _Parser) -> None:
         "--json", action="store_true", help="print run.json on stdout, not the summary"
     )
     parser.add_argument("--no-pictures", action="store_true", help="draw nothing")
-    parser.add_argument("--representation", default="ga", help=argparse.SUPPRESS)
+    parser.add_argument(
+        "--representation",
+        metavar="R",
+        default="ga",
+        help="ga|matrix: motors, or the classical R, x, Π, P (SE(3), SO(3), SE(2))",
+    )
     for option in _LATER_RUN_OPTIONS.values():
         parser.add_argument(option, nargs="?", const=True, help=argparse.SUPPRESS)
 
@@ -308,8 +313,6 @@ def _count(text: str) -> int:
 
 def _run(parsed: argparse.Namespace) -> int:
     _refuse_later_options(parsed, _LATER_RUN_OPTIONS)
-    if parsed.representation != "ga":
-        raise UsageError(f'--representation "{parsed.representation}" is not in this version yet.')
     if parsed.kernels == "generic":
         raise UsageError('--kernels "generic" is not in this version yet.')
     from hamotor.run.result import RunFailed, RunInterrupted
@@ -327,6 +330,7 @@ def _run(parsed: argparse.Namespace) -> int:
             every=parsed.every,
             scalar=parsed.scalar,
             kernels=parsed.kernels,
+            representation=parsed.representation,
             out=out,
             csv=parsed.csv,
             pictures=not parsed.no_pictures,
@@ -461,6 +465,7 @@ def _methods() -> list[tuple[str, str]]:
         ("auto", "what suits the scene; run.json says which and why"),
         ("rkmk4", "Runge-Kutta-Munthe-Kaas, order 4, explicit"),
         ("splitting2", "Strang splitting, order 2, symplectic, keeps coadjoint orbits exactly"),
+        ("rk4", "classical Runge-Kutta, order 4, on matrices: with --representation matrix only"),
     ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import Context, Decimal
+
 from hamotor.codegen.algebra import Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import (
@@ -46,8 +48,15 @@ PAIRS = {
 _SUM, _PRODUCT, _UNARY, _ATOM = range(4)
 
 
+WHOLE = 2**53
+"""Integers up to this are numbers of every scalar that kernels are used with but float."""
+
+
 def number_text(value: Rational) -> str:
-    """An exact constant of scalar type S."""
+    """An exact constant of scalar type S; with 40 digits, where its integers are too long."""
+    if max(abs(value.numerator), value.denominator) > WHOLE:
+        digits = Context(prec=40)
+        return f"S({digits.divide(Decimal(value.numerator), Decimal(value.denominator)):E}L)"
     if value.denominator == 1:
         return f"S({value.numerator})"
     if value.denominator & (value.denominator - 1) == 0 and value.denominator <= 1024:

@@ -72,6 +72,24 @@ def default_includes() -> tuple[Path, ...]:
     return (REPOSITORY / "generated", REPOSITORY / "runtime" / "include")
 
 
+def eigen() -> Path:
+    """The headers of Eigen, which the matrix representation is written with.
+
+    They are looked for in $EIGEN3_INCLUDE_DIR and where systems keep them.  Raises ToolError.
+    """
+    places = [
+        os.environ.get("EIGEN3_INCLUDE_DIR", ""),
+        *(f"{root}/include/eigen3" for root in ("/usr", "/usr/local", "/opt/homebrew", "/opt")),
+    ]
+    for place in filter(None, places):
+        if (Path(place) / "Eigen" / "Core").is_file():
+            return Path(place)
+    raise ToolError(
+        "Eigen not found, which --representation matrix needs. Install it, for example: "
+        "sudo apt-get install libeigen3-dev, or name its folder in EIGEN3_INCLUDE_DIR."
+    )
+
+
 def flags_for(machine: str) -> tuple[str, ...]:
     """The flags every scene is compiled with on a machine of this kind.
 
@@ -197,14 +215,23 @@ def headers_digest(includes: Iterable[Path]) -> str:
     return digest.hexdigest()
 
 
+def _version_of_eigen(folder: Path) -> str:
+    """The file that says its version, whole."""
+    macros = folder / "Eigen" / "src" / "Core" / "util" / "Macros.h"
+    return hashlib.sha256(macros.read_bytes()).hexdigest() if macros.is_file() else ""
+
+
 def compile_scene(
     source: str,
     *,
     includes: Sequence[Path] | None = None,
+    libraries: Sequence[Path] = (),
     cache: Path | None = None,
     on_compile: Callable[[], None] = lambda: None,
 ) -> CompiledScene:
     """Compile the C++ text of a scene to a shared library, or find it compiled already.
+
+    `libraries` are folders of headers that others maintain: a version is what distinguishes them.
 
     `on_compile` is called before the compiler starts, and not where it need not.
 
@@ -220,6 +247,7 @@ def compile_scene(
             [
                 source,
                 headers_digest(includes),
+                [(str(folder), _version_of_eigen(folder)) for folder in libraries],
                 compiler.command,
                 compiler.version,
                 flags,
@@ -239,7 +267,7 @@ def compile_scene(
         _write_whole(kept_source, source.encode())
         on_compile()
         started = time.perf_counter()
-        _run_compiler(compiler, flags, includes, kept_source, library)
+        _run_compiler(compiler, flags, includes, libraries, kept_source, library)
         compile_s = time.perf_counter() - started
     return CompiledScene(
         library=library,
@@ -273,6 +301,7 @@ def _run_compiler(
     compiler: Compiler,
     flags: Sequence[str],
     includes: Sequence[Path],
+    libraries: Sequence[Path],
     source: Path,
     library: Path,
 ) -> None:
@@ -280,6 +309,8 @@ def _run_compiler(
     command = [*compiler.command, *flags]
     for folder in includes:
         command += ["-I", str(folder)]
+    for folder in libraries:
+        command += ["-isystem", str(folder)]
     command += ["-o", str(unfinished), str(source)]
     try:
         answer = subprocess.run(

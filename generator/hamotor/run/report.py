@@ -209,7 +209,7 @@ def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
     drift = said["drift"]
     lines += [
         "",
-        "  |M M̃ − 1| before renormalisation",
+        f"  |{'RᵀR' if said['representation'] == 'matrix' else 'M M̃'} − 1| before renormalisation",
         f"    {drift['largest_step']:.2g} at most in a step, {drift['sum']:.2g} summed over all",
     ]
     if folder is not None:
@@ -218,9 +218,11 @@ def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
 
 
 def _what(said: Mapping[str, Any]) -> str:
+    matrix = said["representation"] == "matrix"
+    form = "matrix form" if matrix else f"{said['kernels']} kernels"
     return (
         f"{said['scene']} · {said['group']} in {said['algebra']} · {said['method']} "
-        f"(order {said['order']}) · {said['scalar']}, {said['kernels']} kernels"
+        f"(order {said['order']}) · {said['scalar']}, {form}"
     )
 
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hamotor.errors import UsageError
-from hamotor.run.build import CompiledScene, compile_scene, default_cache
+from hamotor.errors import UsageError, suggest
+from hamotor.run.build import CompiledScene, compile_scene, default_cache, eigen
 from hamotor.run.dataset import DiskRecorder, MemoryRecorder, RunFolder
 from hamotor.run.library import Description, SceneLibrary, Vector, check_method
 from hamotor.run.progress import NoProgress, PrintedProgress, Progress
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 SCALARS = ("double", "float", "long_double")
 KERNELS = ("generated",)
+REPRESENTATIONS = ("ga", "matrix")
+_MATRIX_METHODS = ("auto", "rkmk4", "rk4")
 
 _AUTO_METHOD = "splitting2"
 _AUTO_REASON = (
@@ -56,26 +58,46 @@ class Simulation:
     spec_hash: str
     methods: tuple[str, ...] = ()
     read: Callable[[], Scene | GeneralScene] | None = None
+    matrix_source: Callable[[str], str] | None = None
+    """Gives the C++ text in the matrix representation, for a scalar."""
 
     def compile(
         self,
         *,
         scalar: str = "double",
         kernels: str = "generated",
+        representation: str = "ga",
         progress: Progress | None = None,
     ) -> Compiled:
         """The scene's shared library, compiled or found in the cache, and loaded.
 
-        Raises UsageError for an unknown scalar or kernels, ToolError when compilation fails.
+        Raises UsageError for an unknown scalar, kernels or representation, ToolError when
+        compilation fails.
         """
-        for name, value, allowed in (("scalar", scalar, SCALARS), ("kernels", kernels, KERNELS)):
+        for name, value, allowed in (
+            ("scalar", scalar, SCALARS),
+            ("kernels", kernels, KERNELS),
+            ("representation", representation, REPRESENTATIONS),
+        ):
             if value not in allowed:
-                raise UsageError(f'unknown {name} "{value}"; there is {", ".join(allowed)}.')
+                raise UsageError(
+                    f'unknown {name} "{value}"; there is {", ".join(allowed)}.'
+                    f"{suggest(value, allowed)}"
+                )
         started = time.perf_counter()
-        source = self.source(kernels, scalar)
+        if representation == "matrix":
+            if self.matrix_source is None:
+                raise UsageError(f"{self.name}: has no matrix form.")
+            source = self.matrix_source(scalar)
+        else:
+            source = self.source(kernels, scalar)
         generate_s = time.perf_counter() - started
         shown = NoProgress() if progress is None else progress
-        build = compile_scene(source, on_compile=lambda: shown.note(f"compiling {self.name} …"))
+        build = compile_scene(
+            source,
+            libraries=(eigen(),) if representation == "matrix" else (),
+            on_compile=lambda: shown.note(f"compiling {self.name} …"),
+        )
         return Compiled(build, SceneLibrary(build.library), generate_s)
 
     def run(
@@ -88,6 +110,7 @@ class Simulation:
         every: int | None = None,
         scalar: str = "double",
         kernels: str = "generated",
+        representation: str = "ga",
         out: str | os.PathLike[str] | None = None,
         csv: bool = False,
         pictures: bool = True,
@@ -101,6 +124,9 @@ class Simulation:
         norm.  Every `every`-th step is recorded, and always the first and the last state; with a
         tolerance, where the scene cannot know the steps, about two thousand rows if not given.
 
+        `representation` "matrix" runs the scene in the classical form (R, x, Π, P) instead of
+        motors, where its group is SE(3), SO(3) or SE(2): the same columns, for comparison.
+
         With `out` the rows stream to that folder, which then holds `run.json`, `trajectory/`,
         pictures and, with `csv`, `trajectory.csv`; without it nothing is written.
 
@@ -112,17 +138,25 @@ class Simulation:
             raise UsageError("give a step or a tolerance, not both.")
         if csv and out is None:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
-        if self.methods:
+        if representation == "matrix" and kernels != "generated":
+            raise UsageError("the matrix form has no kernels; leave out one of the two options.")
+        methods = _MATRIX_METHODS if representation == "matrix" else self.methods
+        chosen = method or self.method
+        if method is None and chosen not in methods and chosen in self.methods:
+            chosen = "auto"  # what the scene asks for, only the other representation has
+        if methods:
             # Before the compiler runs: a slip of the pen should not take seconds to come back.
-            check_method(method or self.method, dict.fromkeys(self.methods, 0))
+            check_method(chosen, dict.fromkeys(methods, 0))
         folder = None if out is None else RunFolder(out)
         shown = _progress(progress)
-        compiled = self.compile(scalar=scalar, kernels=kernels, progress=shown)
+        compiled = self.compile(
+            scalar=scalar, kernels=kernels, representation=representation, progress=shown
+        )
         description = compiled.library.description
         end = self.end if end is None else end
         if step is None and tolerance is None:
             step, tolerance = self.step, self.tolerance
-        method, reason = choose_method(method or self.method, description.methods, tolerance)
+        method, reason = choose_method(chosen, description.methods, tolerance)
 
         def new_recorder() -> Recorder:
             if folder is None:
@@ -157,7 +191,7 @@ class Simulation:
                     )
                 else:
                     raise UsageError("the scene has neither step nor tolerance; give one of them.")
-                run = self._result(compiled, reason, outcome, recorder, folder)
+                run = self._result(compiled, representation, reason, outcome, recorder, folder)
         except BaseException:
             if folder is not None:
                 folder.abandon()
@@ -173,6 +207,7 @@ class Simulation:
     def _result(
         self,
         compiled: Compiled,
+        representation: str,
         reason: str,
         outcome: Outcome,
         recorder: Recorder,
@@ -187,6 +222,7 @@ class Simulation:
             version=__version__,
             method_reason=reason,
             generate_s=compiled.generate_s,
+            representation=representation,
         )
         said = report(origin, compiled.build, description, outcome)
         units = units_of(description)
@@ -260,9 +296,18 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         text = kept.value(f"source {' '.join(choice)}", lambda: scene_source(read(), *choice))
         return str(text)
 
+    def in_matrices(scalar: str) -> str:
+        from hamotor.scene.matrix_source import matrix_source
+
+        return str(kept.value(f"matrix {scalar}", lambda: matrix_source(read(), scalar)))
+
     known = kept.value("settings", settings)
     return Simulation(
-        **{**known, "state": np.array(known["state"])}, source=source, methods=METHODS, read=read
+        **{**known, "state": np.array(known["state"])},
+        source=source,
+        methods=METHODS,
+        read=read,
+        matrix_source=in_matrices,
     )
 
 

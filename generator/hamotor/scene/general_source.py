@@ -17,7 +17,7 @@ from hamotor.scene.source import literal_text, rendered, shortened, text_literal
 
 
 @dataclass(frozen=True)
-class _Body:
+class ProgramText:
     """A program as the template wants it."""
 
     program: Program
@@ -63,7 +63,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
     prove_energy_balance(system)
     first = scene.bodies[0].coordinates
     count = len(scene.bodies)
-    gradient = _Body(system.gradient)
+    gradient = ProgramText(system.gradient)
     forques = [x for name, x in system.gradient.outputs if name.startswith("forque")]
     powered = not scene.hamiltonian.conservative
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
@@ -77,7 +77,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
             ", ".join(cpp.number_text(Fraction(int(x.p), int(x.q))) for x in b.coordinates.origin)
             for b in scene.bodies
         ]
-    own = [(q, x) for q, x in scene.invariants if x is not None and not _has_column(scene, q.name)]
+    own = [(q, x) for q, x in scene.invariants if x is not None and not has_column(scene, q.name)]
     return rendered(
         "general_scene.cpp.jinja",
         scene=scene,
@@ -90,7 +90,7 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         hamiltonian=shortened(str(scene.hamiltonian.energy)),
         bodies=[text_literal(body.name) for body in scene.bodies],
         has_forque=any(x != Number(0) for x in forques),
-        energy=_Body(system.energy),
+        energy=ProgramText(system.energy),
         gradient={
             "cost": gradient.cost,
             "lines": gradient.lines,
@@ -98,13 +98,13 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
             "rates": gradient.outputs("rate", count),
             "forques": gradient.outputs("forque", count),
         },
-        power=_Body(system.power) if powered else None,
+        power=ProgramText(system.power) if powered else None,
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
-        motor_units=[text_literal(_motor_unit(scene, name)) for name in scene.group.motor],
+        motor_units=[text_literal(motor_unit(scene, name)) for name in scene.group.motor],
         momentum_units=[text_literal(unit) for unit in scene.group.units],
         place_names=[text_literal(name) for name in names],
         place_units=[text_literal(unit) for unit in units],
-        place=_Body(
+        place=ProgramText(
             straight_line(
                 {f"value{k}": x for k, x in enumerate(place)},
                 {
@@ -117,11 +117,11 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         pivots=pivots,
         scales=len(names) > first.dimension,
         quantities=_quantities(system, [x for _, x in own]),
-        conserved=[_conserved(scene, q, own) for q, _ in scene.invariants],
+        conserved=[conserved_entry(scene, q, own) for q, _ in scene.invariants],
     )
 
 
-def _motor_unit(scene: GeneralScene, blade: str) -> str:
+def motor_unit(scene: GeneralScene, blade: str) -> str:
     """Lengths: e0 in a projective algebra, e∞ in a conformal one, where e0 is 1/length."""
     if scene.algebra.startswith("pga"):
         return "m" if "0" in blade else "1"
@@ -131,7 +131,7 @@ def _motor_unit(scene: GeneralScene, blade: str) -> str:
     return "1"
 
 
-def _has_column(scene: GeneralScene, name: str) -> bool:
+def has_column(scene: GeneralScene, name: str) -> bool:
     """Whether it is one component of a body's momentum."""
     return any(
         name == f"{b.name}.momentum.{g}" for b in scene.bodies for g in scene.group.generators
@@ -141,7 +141,7 @@ def _has_column(scene: GeneralScene, name: str) -> bool:
 def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | None:
     if not expressions:
         return None
-    body = _Body(system.of({f"value{k}": x for k, x in enumerate(expressions)}))
+    body = ProgramText(system.of({f"value{k}": x for k, x in enumerate(expressions)}))
     return {
         "count": len(expressions),
         "lines": body.lines,
@@ -150,7 +150,8 @@ def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | 
     }
 
 
-def _conserved(scene: GeneralScene, quantity: Any, own: Sequence[Any]) -> dict[str, Any]:
+def conserved_entry(scene: GeneralScene, quantity: Any, own: Sequence[Any]) -> dict[str, Any]:
+    """What the template wants of a conserved quantity; own: those that the scene computes."""
     coefficients = dict(quantity.coefficients)
     names = [body.name for body in scene.bodies]
     indices = [q.name for q, _ in own]

@@ -57,14 +57,12 @@ struct Conserved {
 /// A scene that says itself where a body is: `place(i, motor)` are those of body i in the columns
 /// that `place_names` and `place_units` describe, and it has units for its motors and momenta.
 template <class Scene>
-concept PlacedScene =
-    requires(const typename Scene::Group::template Element<typename Scene::Scalar>& m) {
-      { Scene::place_names.size() } -> std::convertible_to<std::size_t>;
-      { Scene::place_units.size() } -> std::convertible_to<std::size_t>;
-      { Scene::motor_units.size() } -> std::convertible_to<std::size_t>;
-      { Scene::momentum_units.size() } -> std::convertible_to<std::size_t>;
-      { Scene::place(std::size_t{}, m).size() } -> std::convertible_to<std::size_t>;
-    };
+concept PlacedScene = requires {
+  { Scene::place_names.size() } -> std::convertible_to<std::size_t>;
+  { Scene::place_units.size() } -> std::convertible_to<std::size_t>;
+  { Scene::motor_units.size() } -> std::convertible_to<std::size_t>;
+  { Scene::momentum_units.size() } -> std::convertible_to<std::size_t>;
+};
 
 /// What a compiled scene says about itself, as a type.
 template <class Scene>
@@ -89,6 +87,10 @@ namespace scene {
 
 template <class Scene>
 using SystemOf = std::remove_cvref_t<decltype(Scene::system)>;
+
+/// Whether H changes by itself along the motion, so that a run has an account of the work done.
+template <class Scene>
+inline constexpr bool is_powered = requires { &SystemOf<Scene>::power; };
 
 template <class Scene>
 inline constexpr std::size_t motor_size =
@@ -127,7 +129,7 @@ template <class G>
 template <class Scene>
 [[nodiscard]] constexpr std::size_t columns() noexcept {
   std::size_t count = 1 + Scene::bodies.size() * (body_size<Scene> + place_size<Scene>()) + 1 +
-                      (PoweredSystem<SystemOf<Scene>> ? 1 : 0) + momentum_size<Scene>;
+                      (is_powered<Scene> ? 1 : 0) + momentum_size<Scene>;
   for (const auto& conserved : Scene::conserved) count += has_own_column(conserved) ? 1U : 0U;
   return count;
 }
@@ -247,7 +249,7 @@ template <class Scene>
     }
   }
   add("energy", "J", "", "");
-  if constexpr (PoweredSystem<SystemOf<Scene>>) add("work", "J", "", "");
+  if constexpr (is_powered<Scene>) add("work", "J", "", "");
   for (std::size_t k = 0; k < Group::generators.size(); ++k) {
     add("spatial_momentum." + std::string(Group::generators[k]), momentum_unit(k), "world", "");
   }
@@ -302,7 +304,7 @@ template <class Scene>
 using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>>;
 
 /// The JSON of `hamotor_describe`.
-template <SceneDefinition Scene>
+template <class Scene>
 [[nodiscard]] std::string description() {
   using Group = typename Scene::Group;
   return "{\"abi\": 1, \"scene\": " + json_string(Scene::name) +
@@ -510,13 +512,27 @@ class Run {
   bool failed_ = false;
 };
 
+template <class Scene>
+struct RunType {
+  using type = Run<Scene>;
+};
+template <class Scene>
+  requires requires { typename Scene::Run; }
+struct RunType<Scene> {
+  using type = typename Scene::Run;
+};
+
+/// What runs a scene: its own `Run` if it names one (another representation), or `scene::Run`.
+template <class Scene>
+using RunOf = typename RunType<Scene>::type;
+
 /// `hamotor_start`: NULL for an unknown method, or without memory.
-template <SceneDefinition Scene>
+template <class Scene>
 [[nodiscard]] void* start(const char* method, double time, double step,
                           const double* state) noexcept {
   typename MethodsOf<Scene>::AnyOf chosen;
   if (method == nullptr || !MethodsOf<Scene>::choose(method, chosen)) return nullptr;
-  return new (std::nothrow) Run<Scene>(chosen, time, step, state);
+  return new (std::nothrow) RunOf<Scene>(chosen, time, step, state);
 }
 
 }  // namespace scene
@@ -540,23 +556,23 @@ template <SceneDefinition Scene>
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT std::int64_t hamotor_advance(void* run, std::int64_t steps,       \
                                                     std::int64_t every, double* rows) {  \
-    return static_cast<hamotor::scene::Run<Scene>*>(run)->advance(steps, every, rows);   \
+    return static_cast<hamotor::scene::RunOf<Scene>*>(run)->advance(steps, every, rows); \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {              \
-    static_cast<const hamotor::scene::Run<Scene>*>(run)->observe(row);                   \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                 \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_observe_wide(const void* run, long double* row) {    \
-    static_cast<const hamotor::scene::Run<Scene>*>(run)->observe(row);                   \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                 \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {              \
-    static_cast<const hamotor::scene::Run<Scene>*>(run)->read_state(state);              \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->read_state(state);            \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_drift(const void* run, double* drift) {              \
-    const auto& so_far = static_cast<const hamotor::scene::Run<Scene>*>(run)->drift();   \
+    const auto& so_far = static_cast<const hamotor::scene::RunOf<Scene>*>(run)->drift(); \
     drift[0] = static_cast<double>(so_far.largest);                                      \
     drift[1] = static_cast<double>(so_far.sum);                                          \
   }                                                                                      \
   HAMOTOR_SCENE_EXPORT void hamotor_stop(void* run) {                                    \
-    delete static_cast<hamotor::scene::Run<Scene>*>(run);                                \
+    delete static_cast<hamotor::scene::RunOf<Scene>*>(run);                              \
   }                                                                                      \
-  static_assert(hamotor::SceneDefinition<Scene>)
+  static_assert(sizeof(hamotor::scene::RunOf<Scene>) > 0)
