@@ -422,9 +422,27 @@ def _show(parsed: argparse.Namespace) -> int:
             f"({', '.join(names)}) nor a file.{suggest(parsed.what, known)}"
         )
     if parsed.words:
-        raise UsageError(f'show SCENE: "{" ".join(parsed.words)}" is not in this version yet.')
+        print(_equations(parsed.what, parsed.words), end="")
+        return 0
     print(account(read_scene(parsed.what)))
     return 0
+
+
+def _equations(scene: str, words: Sequence[str]) -> str:
+    """`equations`, and then in any order `ga` or `classical`, `text` or `latex`."""
+    from hamotor.mechanics.equations import FORMS, STYLES, equations
+    from hamotor.scene import read_scene
+
+    allowed = ("equations", *FORMS, *STYLES)
+    for word in words:
+        if word not in allowed or words[0] != "equations":
+            raise UsageError(
+                f'show SCENE: unknown "{word}"; write equations [ga|classical] [text|latex].'
+                f"{suggest(word, allowed)}"
+            )
+    form = "classical" if "classical" in words else "ga"
+    style = "latex" if "latex" in words else "text"
+    return equations(read_scene(scene).hamiltonian, form, style)
 
 
 def _table(parsed: argparse.Namespace) -> int:

@@ -143,7 +143,7 @@ def test_a_rejected_text_exits_with_4(
         ("new scnee", 'Did you mean "scene"'),
         ("show dzanibekov", 'Did you mean "dzhanibekov"'),
         ("show pga3", "name a product and its operands"),
-        ("show dzhanibekov equations", "not in this version yet"),
+        ("show dzhanibekov equation", "unknown .equation.; write equations"),
         ("compare a b", "a holds no hamotor run"),
         ("compare a b --tolerance -1", "must not be negative"),
     ],
