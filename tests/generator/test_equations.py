@@ -152,6 +152,6 @@ def test_classical_form_is_refused_where_there_is_none(
 def test_unknown_forms_and_styles_are_refused() -> None:
     hamiltonian = example("pga2", "SE2")
     with pytest.raises(UsageError, match=r'unknown form "clasical".*classical'):
-        equations(hamiltonian, "clasical")  # type: ignore[arg-type]
+        equations(hamiltonian, "clasical")
     with pytest.raises(UsageError, match='unknown style "tex"'):
-        equations(hamiltonian, style="tex")  # type: ignore[arg-type]
+        equations(hamiltonian, style="tex")

@@ -10,7 +10,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import sympy
 from sympy.printing.precedence import PRECEDENCE, precedence
@@ -35,8 +34,8 @@ _GREEK = {"Pi": "Π", "Omega": "Ω", "tau": "τ", "mu": "μ"}
 
 def equations(
     hamiltonian: Hamiltonian,
-    form: Literal["ga", "classical"] = "ga",
-    style: Literal["text", "latex"] = "text",
+    form: str = "ga",
+    style: str = "text",
 ) -> str:
     """All equations of motion, ending with a newline; parameters stay symbols, values are listed.
 
