@@ -8,7 +8,6 @@
 
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
-#include "hamotor/lanes.hpp"
 #include "hamotor/pga4/elements.hpp"
 
 namespace hamotor::pga4 {
@@ -516,201 +515,157 @@ template <class S>
 
 /// sandwich: Motor Bivector -> Bivector
 /// m x ~m: moves x by m.
-/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
-/// Cost: 162 mul, 136 add (110 fused).
+/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
+/// Cost: 166 mul, 142 add (118 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Motor<S>& m, const Bivector<S>& b) noexcept {
-  if constexpr (lanes::packed<S>) {
-    if (!std::is_constant_evaluated()) {
-      using lanes::four;
-      using lanes::turned;
-      const auto four_m_s = four(m.s, m.e12, m.e13, m.e23);
-      const auto four_m_e14 = four(m.e14, m.e24, m.e34, m.e1234);
-      const auto sum1 =
-          dot(four(b.e12), turned<2, 1, -4, 3>(four_m_s), four(b.e13),
-              turned<3, 4, 1, -2>(four_m_s), four(b.e14), turned<1, 2, 3, -4>(four_m_e14),
-              four(b.e23), turned<4, -3, 2, 1>(four_m_s), four(b.e24),
-              turned<2, -1, 4, 3>(four_m_e14), four(b.e34), turned<3, -4, -1, -2>(four_m_e14));
-      const S y_s = sum1[0];
-      const S y_e12 = sum1[1];
-      const S y_e13 = sum1[2];
-      const S y_e23 = sum1[3];
-      const auto sum2 =
-          dot(four(b.e12), turned<-2, 1, -4, -3>(four_m_e14), four(b.e13),
-              turned<-3, 4, 1, 2>(four_m_e14), four(b.e14), turned<1, -2, -3, -4>(four_m_s),
-              four(b.e23), turned<-4, -3, 2, -1>(four_m_e14), four(b.e24),
-              turned<2, 1, -4, 3>(four_m_s), four(b.e34), turned<3, 4, 1, -2>(four_m_s));
-      const S y_e14 = sum2[0];
-      const S y_e24 = sum2[1];
-      const S y_e34 = sum2[2];
-      const S y_e1234 = sum2[3];
-      const auto sum3 = dot(
-          four(b.e01), turned<1, -2, -3, -4>(four_m_s), four(b.e02), turned<2, 1, -4, 3>(four_m_s),
-          four(b.e03), turned<3, 4, 1, -2>(four_m_s), four(b.e04), turned<1, 2, 3, -4>(four_m_e14));
-      const S y_e01 = sum3[0];
-      const S y_e02 = sum3[1];
-      const S y_e03 = sum3[2];
-      const S y_e0123 = sum3[3];
-      const auto sum4 =
-          dot(four(b.e01), turned<-1, -2, -3, 4>(four_m_e14), four(b.e02),
-              turned<-2, 1, -4, -3>(four_m_e14), four(b.e03), turned<-3, 4, 1, 2>(four_m_e14),
-              four(b.e04), turned<1, -2, -3, -4>(four_m_s));
-      const S y_e04 = sum4[0];
-      const S y_e0124 = sum4[1];
-      const S y_e0134 = sum4[2];
-      const S y_e0234 = sum4[3];
-      return {
-          .e12 =
-              mul_add(S(2), dot(-m.e13, y_e23, -m.e14, y_e24, m.e23, y_e13, m.e24, y_e14), b.e12),
-          .e13 =
-              mul_add(S(2), dot(m.e12, y_e23, -m.e14, y_e34, -m.e23, y_e12, m.e34, y_e14), b.e13),
-          .e14 =
-              mul_add(S(2), dot(m.e12, y_e24, m.e13, y_e34, -m.e24, y_e12, -m.e34, y_e13), b.e14),
-          .e23 =
-              mul_add(S(2), dot(-m.e12, y_e13, m.e13, y_e12, -m.e24, y_e34, m.e34, y_e24), b.e23),
-          .e24 =
-              mul_add(S(2), dot(-m.e12, y_e14, m.e14, y_e12, m.e23, y_e34, -m.e34, y_e23), b.e24),
-          .e34 =
-              mul_add(S(2), dot(-m.e13, y_e14, m.e14, y_e13, -m.e23, y_e24, m.e24, y_e23), b.e34),
-          .e01 = mul_add(S(2),
-                         dot(m.e12, y_e02, m.e13, y_e03, m.e14, y_e04, -m.e1234, y_e0234, m.e01,
-                             y_s, -m.e02, y_e12, -m.e03, y_e13, -m.e04, y_e14, -m.e0123, y_e23,
-                             -m.e0124, y_e24, -m.e0134, y_e34, m.e0234, y_e1234),
-                         b.e01),
-          .e02 = mul_add(S(2),
-                         dot(-m.e12, y_e01, m.e23, y_e03, m.e24, y_e04, m.e1234, y_e0134, m.e01,
-                             y_e12, m.e02, y_s, -m.e03, y_e23, -m.e04, y_e24, m.e0123, y_e13,
-                             m.e0124, y_e14, -m.e0134, y_e1234, -m.e0234, y_e34),
-                         b.e02),
-          .e03 = mul_add(S(2),
-                         dot(-m.e13, y_e01, -m.e23, y_e02, m.e34, y_e04, -m.e1234, y_e0124, m.e01,
-                             y_e13, m.e02, y_e23, m.e03, y_s, -m.e04, y_e34, -m.e0123, y_e12,
-                             m.e0124, y_e1234, m.e0134, y_e14, m.e0234, y_e24),
-                         b.e03),
-          .e04 = mul_add(S(2),
-                         dot(-m.e14, y_e01, -m.e24, y_e02, -m.e34, y_e03, m.e1234, y_e0123, m.e01,
-                             y_e14, m.e02, y_e24, m.e03, y_e34, m.e04, y_s, -m.e0123, y_e1234,
-                             -m.e0124, y_e12, -m.e0134, y_e13, -m.e0234, y_e23),
-                         b.e04)};
-    }
-  }
-  const S y_s =
-      dot(b.e12, m.e12, b.e13, m.e13, b.e14, m.e14, b.e23, m.e23, b.e24, m.e24, b.e34, m.e34);
-  const S y_e01 = dot(b.e01, m.s, b.e02, m.e12, b.e03, m.e13, b.e04, m.e14);
-  const S y_e02 = dot(-b.e01, m.e12, b.e02, m.s, b.e03, m.e23, b.e04, m.e24);
-  const S y_e12 =
-      dot(b.e12, m.s, b.e13, m.e23, b.e14, m.e24, -b.e23, m.e13, -b.e24, m.e14, -b.e34, m.e1234);
-  const S y_e03 = dot(-b.e01, m.e13, -b.e02, m.e23, b.e03, m.s, b.e04, m.e34);
-  const S y_e13 =
-      dot(-b.e12, m.e23, b.e13, m.s, b.e14, m.e34, b.e23, m.e12, b.e24, m.e1234, -b.e34, m.e14);
-  const S y_e23 =
-      dot(b.e12, m.e13, -b.e13, m.e12, -b.e14, m.e1234, b.e23, m.s, b.e24, m.e34, -b.e34, m.e24);
-  const S y_e0123 = dot(-b.e01, m.e23, b.e02, m.e13, -b.e03, m.e12, -b.e04, m.e1234);
-  const S y_e04 = dot(-b.e01, m.e14, -b.e02, m.e24, -b.e03, m.e34, b.e04, m.s);
-  const S y_e14 =
-      dot(-b.e12, m.e24, -b.e13, m.e34, b.e14, m.s, -b.e23, m.e1234, b.e24, m.e12, b.e34, m.e13);
-  const S y_e24 =
-      dot(b.e12, m.e14, b.e13, m.e1234, -b.e14, m.e12, -b.e23, m.e34, b.e24, m.s, b.e34, m.e23);
-  const S y_e0124 = dot(-b.e01, m.e24, b.e02, m.e14, b.e03, m.e1234, -b.e04, m.e12);
-  const S y_e34 =
-      dot(-b.e12, m.e1234, b.e13, m.e14, -b.e14, m.e13, b.e23, m.e24, -b.e24, m.e23, b.e34, m.s);
-  const S y_e0134 = dot(-b.e01, m.e34, -b.e02, m.e1234, b.e03, m.e14, -b.e04, m.e13);
-  const S y_e0234 = dot(b.e01, m.e1234, -b.e02, m.e34, b.e03, m.e24, -b.e04, m.e23);
-  const S y_e1234 =
-      dot(-b.e12, m.e34, b.e13, m.e24, -b.e14, m.e23, -b.e23, m.e14, b.e24, m.e13, -b.e34, m.e12);
+  const S c_e01 =
+      dot(b.e02, m.e12, b.e03, m.e13, b.e04, m.e14, -b.e12, m.e02, -b.e13, m.e03, -b.e14, m.e04);
+  const S c_e02 =
+      dot(-b.e01, m.e12, b.e03, m.e23, b.e04, m.e24, b.e12, m.e01, -b.e23, m.e03, -b.e24, m.e04);
+  const S c_e12 = dot(-b.e23, m.e13, -b.e24, m.e14, b.e13, m.e23, b.e14, m.e24);
+  const S c_e03 =
+      dot(-b.e01, m.e13, -b.e02, m.e23, b.e04, m.e34, b.e13, m.e01, b.e23, m.e02, -b.e34, m.e04);
+  const S c_e13 = dot(b.e23, m.e12, -b.e34, m.e14, -b.e12, m.e23, b.e14, m.e34);
+  const S c_e23 = dot(-b.e13, m.e12, b.e12, m.e13, -b.e34, m.e24, b.e24, m.e34);
+  const S c_e0123 = dot(b.e04, m.e1234, -b.e34, m.e0124, b.e24, m.e0134, -b.e14, m.e0234);
+  const S c_e04 =
+      dot(-b.e01, m.e14, -b.e02, m.e24, -b.e03, m.e34, b.e14, m.e01, b.e24, m.e02, b.e34, m.e03);
+  const S c_e14 = dot(b.e24, m.e12, b.e34, m.e13, -b.e12, m.e24, -b.e13, m.e34);
+  const S c_e24 = dot(-b.e14, m.e12, b.e12, m.e14, b.e34, m.e23, -b.e23, m.e34);
+  const S c_e0124 = dot(-b.e03, m.e1234, b.e34, m.e0123, -b.e23, m.e0134, b.e13, m.e0234);
+  const S c_e34 = dot(-b.e14, m.e13, b.e13, m.e14, -b.e24, m.e23, b.e23, m.e24);
+  const S c_e0134 = dot(b.e02, m.e1234, -b.e24, m.e0123, b.e23, m.e0124, -b.e12, m.e0234);
+  const S c_e0234 = dot(-b.e01, m.e1234, b.e14, m.e0123, -b.e13, m.e0124, b.e12, m.e0134);
   return {
-      .e12 = mul_add(S(2), dot(-m.e13, y_e23, -m.e14, y_e24, m.e23, y_e13, m.e24, y_e14), b.e12),
-      .e13 = mul_add(S(2), dot(m.e12, y_e23, -m.e14, y_e34, -m.e23, y_e12, m.e34, y_e14), b.e13),
-      .e14 = mul_add(S(2), dot(m.e12, y_e24, m.e13, y_e34, -m.e24, y_e12, -m.e34, y_e13), b.e14),
-      .e23 = mul_add(S(2), dot(-m.e12, y_e13, m.e13, y_e12, -m.e24, y_e34, m.e34, y_e24), b.e23),
-      .e24 = mul_add(S(2), dot(-m.e12, y_e14, m.e14, y_e12, m.e23, y_e34, -m.e34, y_e23), b.e24),
-      .e34 = mul_add(S(2), dot(-m.e13, y_e14, m.e14, y_e13, -m.e23, y_e24, m.e24, y_e23), b.e34),
-      .e01 = mul_add(S(2),
-                     dot(m.e12, y_e02, m.e13, y_e03, m.e14, y_e04, -m.e1234, y_e0234, m.e01, y_s,
-                         -m.e02, y_e12, -m.e03, y_e13, -m.e04, y_e14, -m.e0123, y_e23, -m.e0124,
-                         y_e24, -m.e0134, y_e34, m.e0234, y_e1234),
-                     b.e01),
-      .e02 = mul_add(S(2),
-                     dot(-m.e12, y_e01, m.e23, y_e03, m.e24, y_e04, m.e1234, y_e0134, m.e01, y_e12,
-                         m.e02, y_s, -m.e03, y_e23, -m.e04, y_e24, m.e0123, y_e13, m.e0124, y_e14,
-                         -m.e0134, y_e1234, -m.e0234, y_e34),
-                     b.e02),
+      .e12 = mul_add(S(2),
+                     dot(c_e12, m.s, c_e13, m.e23, -c_e23, m.e13, c_e14, m.e24, -c_e24, m.e14,
+                         -c_e34, m.e1234),
+                     b.e12),
+      .e13 = mul_add(
+          S(2),
+          dot(-c_e12, m.e23, c_e13, m.s, c_e23, m.e12, c_e14, m.e34, c_e24, m.e1234, -c_e34, m.e14),
+          b.e13),
+      .e14 = mul_add(S(2),
+                     dot(-c_e12, m.e24, -c_e13, m.e34, -c_e23, m.e1234, c_e14, m.s, c_e24, m.e12,
+                         c_e34, m.e13),
+                     b.e14),
+      .e23 = mul_add(S(2),
+                     dot(c_e12, m.e13, -c_e13, m.e12, c_e23, m.s, -c_e14, m.e1234, c_e24, m.e34,
+                         -c_e34, m.e24),
+                     b.e23),
+      .e24 = mul_add(
+          S(2),
+          dot(c_e12, m.e14, c_e13, m.e1234, -c_e23, m.e34, -c_e14, m.e12, c_e24, m.s, c_e34, m.e23),
+          b.e24),
+      .e34 = mul_add(S(2),
+                     dot(-c_e12, m.e1234, c_e13, m.e14, c_e23, m.e24, -c_e14, m.e13, -c_e24, m.e23,
+                         c_e34, m.s),
+                     b.e34),
+      .e01 =
+          mul_add(S(2),
+                  dot(c_e01, m.s, c_e02, m.e12, -c_e12, m.e02, c_e03, m.e13, -c_e13, m.e03, -c_e23,
+                      m.e0123, c_e0123, m.e23, c_e04, m.e14, -c_e14, m.e04, -c_e24, m.e0124,
+                      c_e0124, m.e24, -c_e34, m.e0134, c_e0134, m.e34, c_e0234, m.e1234),
+                  b.e01),
+      .e02 =
+          mul_add(S(2),
+                  dot(-c_e01, m.e12, c_e02, m.s, c_e12, m.e01, c_e03, m.e23, c_e13, m.e0123, -c_e23,
+                      m.e03, -c_e0123, m.e13, c_e04, m.e24, c_e14, m.e0124, -c_e24, m.e04, -c_e0124,
+                      m.e14, -c_e34, m.e0234, -c_e0134, m.e1234, c_e0234, m.e34),
+                  b.e02),
       .e03 = mul_add(S(2),
-                     dot(-m.e13, y_e01, -m.e23, y_e02, m.e34, y_e04, -m.e1234, y_e0124, m.e01,
-                         y_e13, m.e02, y_e23, m.e03, y_s, -m.e04, y_e34, -m.e0123, y_e12, m.e0124,
-                         y_e1234, m.e0134, y_e14, m.e0234, y_e24),
+                     dot(-c_e01, m.e13, -c_e02, m.e23, -c_e12, m.e0123, c_e03, m.s, c_e13, m.e01,
+                         c_e23, m.e02, c_e0123, m.e12, c_e04, m.e34, c_e14, m.e0134, c_e24, m.e0234,
+                         c_e0124, m.e1234, -c_e34, m.e04, -c_e0134, m.e14, -c_e0234, m.e24),
                      b.e03),
-      .e04 = mul_add(S(2),
-                     dot(-m.e14, y_e01, -m.e24, y_e02, -m.e34, y_e03, m.e1234, y_e0123, m.e01,
-                         y_e14, m.e02, y_e24, m.e03, y_e34, m.e04, y_s, -m.e0123, y_e1234, -m.e0124,
-                         y_e12, -m.e0134, y_e13, -m.e0234, y_e23),
-                     b.e04)};
+      .e04 =
+          mul_add(S(2),
+                  dot(-c_e01, m.e14, -c_e02, m.e24, -c_e12, m.e0124, -c_e03, m.e34, -c_e13, m.e0134,
+                      -c_e23, m.e0234, -c_e0123, m.e1234, c_e04, m.s, c_e14, m.e01, c_e24, m.e02,
+                      c_e0124, m.e12, c_e34, m.e03, c_e0134, m.e13, c_e0234, m.e23),
+                  b.e04)};
 }
 
 /// sandwich: Motor Trivector -> Trivector
 /// m x ~m: moves x by m.
-/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
-/// Cost: 166 mul, 142 add (118 fused).
+/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
+/// Cost: 188 mul, 163 add (146 fused).
 template <class S>
 [[nodiscard]] constexpr Trivector<S> sandwich(const Motor<S>& m, const Trivector<S>& t) noexcept {
-  const S y_e1 = dot(m.e23, t.e123, m.e24, t.e124, m.e34, t.e134, m.e1234, t.e234);
-  const S y_e2 = dot(-m.e13, t.e123, -m.e14, t.e124, -m.e1234, t.e134, m.e34, t.e234);
-  const S y_e012 = dot(m.s, t.e012, m.e23, t.e013, m.e24, t.e014, -m.e13, t.e023, -m.e14, t.e024,
-                       -m.e1234, t.e034);
-  const S y_e3 = dot(m.e12, t.e123, m.e1234, t.e124, -m.e14, t.e134, -m.e24, t.e234);
-  const S y_e013 = dot(-m.e23, t.e012, m.s, t.e013, m.e34, t.e014, m.e12, t.e023, m.e1234, t.e024,
-                       -m.e14, t.e034);
-  const S y_e023 = dot(m.e13, t.e012, -m.e12, t.e013, -m.e1234, t.e014, m.s, t.e023, m.e34, t.e024,
-                       -m.e24, t.e034);
-  const S y_e123 = dot(m.s, t.e123, m.e34, t.e124, -m.e24, t.e134, m.e14, t.e234);
-  const S y_e4 = dot(-m.e1234, t.e123, m.e12, t.e124, m.e13, t.e134, m.e23, t.e234);
-  const S y_e014 = dot(-m.e24, t.e012, -m.e34, t.e013, m.s, t.e014, -m.e1234, t.e023, m.e12, t.e024,
-                       m.e13, t.e034);
-  const S y_e024 = dot(m.e14, t.e012, m.e1234, t.e013, -m.e12, t.e014, -m.e34, t.e023, m.s, t.e024,
-                       m.e23, t.e034);
-  const S y_e124 = dot(-m.e34, t.e123, m.s, t.e124, m.e23, t.e134, -m.e13, t.e234);
-  const S y_e034 = dot(-m.e1234, t.e012, m.e14, t.e013, -m.e13, t.e014, m.e24, t.e023, -m.e23,
-                       t.e024, m.s, t.e034);
-  const S y_e134 = dot(m.e24, t.e123, -m.e23, t.e124, m.s, t.e134, m.e12, t.e234);
-  const S y_e234 = dot(-m.e14, t.e123, m.e13, t.e124, -m.e12, t.e134, m.s, t.e234);
+  const S c_e0 = dot(m.e0123, t.e123, m.e0124, t.e124, m.e0134, t.e134, m.e0234, t.e234);
+  const S c_e1 = m.e1234 * t.e234;
+  const S c_e2 = m.e1234 * t.e134;
+  const S c_e012 = dot(-m.e13, t.e023, -m.e14, t.e024, m.e23, t.e013, m.e24, t.e014, m.e03, t.e123,
+                       m.e04, t.e124);
+  const S c_e3 = m.e1234 * t.e124;
+  const S c_e013 = dot(m.e12, t.e023, -m.e14, t.e034, -m.e23, t.e012, m.e34, t.e014, -m.e02, t.e123,
+                       m.e04, t.e134);
+  const S c_e023 = dot(-m.e12, t.e013, m.e13, t.e012, -m.e24, t.e034, m.e34, t.e024, m.e01, t.e123,
+                       m.e04, t.e234);
+  const S c_e123 = dot(m.e14, t.e234, -m.e24, t.e134, m.e34, t.e124);
+  const S c_e4 = m.e1234 * t.e123;
+  const S c_e014 = dot(m.e12, t.e024, m.e13, t.e034, -m.e24, t.e012, -m.e34, t.e013, -m.e02, t.e124,
+                       -m.e03, t.e134);
+  const S c_e024 = dot(-m.e12, t.e014, m.e14, t.e012, m.e23, t.e034, -m.e34, t.e023, m.e01, t.e124,
+                       -m.e03, t.e234);
+  const S c_e124 = dot(-m.e13, t.e234, m.e23, t.e134, -m.e34, t.e123);
+  const S c_e034 = dot(-m.e13, t.e014, m.e14, t.e013, -m.e23, t.e024, m.e24, t.e023, m.e01, t.e134,
+                       m.e02, t.e234);
+  const S c_e134 = dot(m.e12, t.e234, -m.e23, t.e124, m.e24, t.e123);
+  const S c_e234 = dot(-m.e12, t.e134, m.e13, t.e124, -m.e14, t.e123);
   return {
-      .e012 = mul_add(S(2),
-                      dot(-m.e13, y_e023, -m.e14, y_e024, m.e23, y_e013, m.e24, y_e014, m.e01, y_e2,
-                          -m.e02, y_e1, m.e03, y_e123, m.e04, y_e124, m.e0123, y_e3, m.e0124, y_e4,
-                          -m.e0134, y_e234, m.e0234, y_e134),
-                      t.e012),
-      .e013 = mul_add(S(2),
-                      dot(m.e12, y_e023, -m.e14, y_e034, -m.e23, y_e012, m.e34, y_e014, m.e01, y_e3,
-                          -m.e02, y_e123, -m.e03, y_e1, m.e04, y_e134, -m.e0123, y_e2, m.e0124,
-                          y_e234, m.e0134, y_e4, -m.e0234, y_e124),
-                      t.e013),
-      .e014 = mul_add(S(2),
-                      dot(m.e12, y_e024, m.e13, y_e034, -m.e24, y_e012, -m.e34, y_e013, m.e01, y_e4,
-                          -m.e02, y_e124, -m.e03, y_e134, -m.e04, y_e1, -m.e0123, y_e234, -m.e0124,
-                          y_e2, -m.e0134, y_e3, m.e0234, y_e123),
-                      t.e014),
-      .e023 = mul_add(S(2),
-                      dot(-m.e12, y_e013, m.e13, y_e012, -m.e24, y_e034, m.e34, y_e024, m.e01,
-                          y_e123, m.e02, y_e3, -m.e03, y_e2, m.e04, y_e234, m.e0123, y_e1, -m.e0124,
-                          y_e134, m.e0134, y_e124, m.e0234, y_e4),
-                      t.e023),
-      .e024 = mul_add(S(2),
-                      dot(-m.e12, y_e014, m.e14, y_e012, m.e23, y_e034, -m.e34, y_e023, m.e01,
-                          y_e124, m.e02, y_e4, -m.e03, y_e234, -m.e04, y_e2, m.e0123, y_e134,
-                          m.e0124, y_e1, -m.e0134, y_e123, -m.e0234, y_e3),
-                      t.e024),
-      .e034 = mul_add(S(2),
-                      dot(-m.e13, y_e014, m.e14, y_e013, -m.e23, y_e024, m.e24, y_e023, m.e01,
-                          y_e134, m.e02, y_e234, m.e03, y_e4, -m.e04, y_e3, -m.e0123, y_e124,
-                          m.e0124, y_e123, m.e0134, y_e1, m.e0234, y_e2),
-                      t.e034),
-      .e123 =
-          mul_add(S(2), dot(m.e14, y_e234, -m.e24, y_e134, m.e34, y_e124, m.e1234, y_e4), t.e123),
-      .e124 =
-          mul_add(S(2), dot(-m.e13, y_e234, m.e23, y_e134, -m.e34, y_e123, -m.e1234, y_e3), t.e124),
-      .e134 =
-          mul_add(S(2), dot(m.e12, y_e234, -m.e23, y_e124, m.e24, y_e123, m.e1234, y_e2), t.e134),
-      .e234 = mul_add(S(2), dot(-m.e12, y_e134, m.e13, y_e124, -m.e14, y_e123, -m.e1234, y_e1),
+      .e012 =
+          mul_add(S(2),
+                  dot(c_e0, m.e12, -c_e1, m.e02, -c_e2, m.e01, c_e012, m.s, c_e3, m.e0123, c_e013,
+                      m.e23, -c_e023, m.e13, c_e123, m.e03, -c_e4, m.e0124, c_e014, m.e24, -c_e024,
+                      m.e14, c_e124, m.e04, -c_e034, m.e1234, c_e134, m.e0234, -c_e234, m.e0134),
+                  t.e012),
+      .e013 =
+          mul_add(S(2),
+                  dot(c_e0, m.e13, -c_e1, m.e03, c_e2, m.e0123, -c_e012, m.e23, c_e3, m.e01, c_e013,
+                      m.s, c_e023, m.e12, -c_e123, m.e02, -c_e4, m.e0134, c_e014, m.e34, c_e024,
+                      m.e1234, -c_e124, m.e0234, -c_e034, m.e14, c_e134, m.e04, c_e234, m.e0124),
+                  t.e013),
+      .e014 = mul_add(
+          S(2),
+          dot(c_e0, m.e14, -c_e1, m.e04, c_e2, m.e0124, -c_e012, m.e24, -c_e3, m.e0134, -c_e013,
+              m.e34, -c_e023, m.e1234, c_e123, m.e0234, -c_e4, m.e01, c_e014, m.s, c_e024, m.e12,
+              -c_e124, m.e02, c_e034, m.e13, -c_e134, m.e03, -c_e234, m.e0123),
+          t.e014),
+      .e023 =
+          mul_add(S(2),
+                  dot(c_e0, m.e23, c_e1, m.e0123, c_e2, m.e03, c_e012, m.e13, c_e3, m.e02, -c_e013,
+                      m.e12, c_e023, m.s, c_e123, m.e01, -c_e4, m.e0234, -c_e014, m.e1234, c_e024,
+                      m.e34, c_e124, m.e0134, -c_e034, m.e24, -c_e134, m.e0124, c_e234, m.e04),
+                  t.e023),
+      .e024 = mul_add(
+          S(2),
+          dot(c_e0, m.e24, c_e1, m.e0124, c_e2, m.e04, c_e012, m.e14, -c_e3, m.e0234, c_e013,
+              m.e1234, -c_e023, m.e34, -c_e123, m.e0134, -c_e4, m.e02, -c_e014, m.e12, c_e024, m.s,
+              c_e124, m.e01, c_e034, m.e23, c_e134, m.e0123, -c_e234, m.e03),
+          t.e024),
+      .e034 =
+          mul_add(S(2),
+                  dot(c_e0, m.e34, c_e1, m.e0134, -c_e2, m.e0234, -c_e012, m.e1234, -c_e3, m.e04,
+                      c_e013, m.e14, c_e023, m.e24, c_e123, m.e0124, -c_e4, m.e03, -c_e014, m.e13,
+                      -c_e024, m.e23, -c_e124, m.e0123, c_e034, m.s, c_e134, m.e01, c_e234, m.e02),
+                  t.e034),
+      .e123 = mul_add(S(2),
+                      dot(c_e1, m.e23, c_e2, m.e13, c_e3, m.e12, c_e123, m.s, -c_e4, m.e1234,
+                          c_e124, m.e34, -c_e134, m.e24, c_e234, m.e14),
+                      t.e123),
+      .e124 = mul_add(S(2),
+                      dot(c_e1, m.e24, c_e2, m.e14, -c_e3, m.e1234, -c_e123, m.e34, -c_e4, m.e12,
+                          c_e124, m.s, c_e134, m.e23, -c_e234, m.e13),
+                      t.e124),
+      .e134 = mul_add(S(2),
+                      dot(c_e1, m.e34, -c_e2, m.e1234, -c_e3, m.e14, c_e123, m.e24, -c_e4, m.e13,
+                          -c_e124, m.e23, c_e134, m.s, c_e234, m.e12),
+                      t.e134),
+      .e234 = mul_add(S(2),
+                      dot(-c_e1, m.e1234, -c_e2, m.e34, -c_e3, m.e24, -c_e123, m.e14, -c_e4, m.e23,
+                          c_e124, m.e13, -c_e134, m.e12, c_e234, m.s),
                       t.e234)};
 }
 

@@ -107,126 +107,159 @@ template <class S>
 
 /// Ad: Motor Rate -> Rate
 /// m w ~m: a body rate as a spatial rate.
-/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
-/// Cost: 162 mul, 136 add (110 fused).
+/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
+/// Cost: 166 mul, 142 add (118 fused).
 template <class S>
 [[nodiscard]] constexpr se4::Rate<S> Ad(const Motor<S>& m, const se4::Rate<S>& w) noexcept {
-  const S y_s =
-      dot(m.e12, w.w12, m.e13, w.w13, m.e14, w.w14, m.e23, w.w23, m.e24, w.w24, m.e34, w.w34);
-  const S y_e01 = dot(m.s, w.v1, m.e12, w.v2, m.e13, w.v3, m.e14, w.v4);
-  const S y_e02 = dot(m.e12, w.v1, -m.s, w.v2, -m.e23, w.v3, -m.e24, w.v4);
-  const S y_e12 =
-      dot(-m.s, w.w12, -m.e23, w.w13, -m.e24, w.w14, m.e13, w.w23, m.e14, w.w24, m.e1234, w.w34);
-  const S y_e03 = dot(m.e13, w.v1, m.e23, w.v2, -m.s, w.v3, -m.e34, w.v4);
-  const S y_e13 =
-      dot(m.e23, w.w12, -m.s, w.w13, -m.e34, w.w14, -m.e12, w.w23, -m.e1234, w.w24, m.e14, w.w34);
-  const S y_e23 =
-      dot(-m.e13, w.w12, m.e12, w.w13, m.e1234, w.w14, -m.s, w.w23, -m.e34, w.w24, m.e24, w.w34);
-  const S y_e0123 = dot(m.e23, w.v1, -m.e13, w.v2, m.e12, w.v3, m.e1234, w.v4);
-  const S y_e04 = dot(m.e14, w.v1, m.e24, w.v2, m.e34, w.v3, -m.s, w.v4);
-  const S y_e14 =
-      dot(m.e24, w.w12, m.e34, w.w13, -m.s, w.w14, m.e1234, w.w23, -m.e12, w.w24, -m.e13, w.w34);
-  const S y_e24 =
-      dot(-m.e14, w.w12, -m.e1234, w.w13, m.e12, w.w14, m.e34, w.w23, -m.s, w.w24, -m.e23, w.w34);
-  const S y_e0124 = dot(m.e24, w.v1, -m.e14, w.v2, -m.e1234, w.v3, m.e12, w.v4);
-  const S y_e34 =
-      dot(m.e1234, w.w12, -m.e14, w.w13, m.e13, w.w14, -m.e24, w.w23, m.e23, w.w24, -m.s, w.w34);
-  const S y_e0134 = dot(m.e34, w.v1, m.e1234, w.v2, -m.e14, w.v3, m.e13, w.v4);
-  const S y_e0234 = dot(-m.e1234, w.v1, m.e34, w.v2, -m.e24, w.v3, m.e23, w.v4);
-  const S y_e1234 =
-      dot(m.e34, w.w12, -m.e24, w.w13, m.e23, w.w14, m.e14, w.w23, -m.e13, w.w24, m.e12, w.w34);
-  return {
-      .w12 = mul_add(S(2), dot(m.e13, y_e23, m.e14, y_e24, -m.e23, y_e13, -m.e24, y_e14), w.w12),
-      .w13 = mul_add(S(2), dot(-m.e12, y_e23, m.e14, y_e34, m.e23, y_e12, -m.e34, y_e14), w.w13),
-      .w14 = mul_add(S(2), dot(-m.e12, y_e24, -m.e13, y_e34, m.e24, y_e12, m.e34, y_e13), w.w14),
-      .w23 = mul_add(S(2), dot(m.e12, y_e13, -m.e13, y_e12, m.e24, y_e34, -m.e34, y_e24), w.w23),
-      .w24 = mul_add(S(2), dot(m.e12, y_e14, -m.e14, y_e12, -m.e23, y_e34, m.e34, y_e23), w.w24),
-      .w34 = mul_add(S(2), dot(m.e13, y_e14, -m.e14, y_e13, m.e23, y_e24, -m.e24, y_e23), w.w34),
-      .v1 = mul_add(S(2),
-                    dot(-m.e12, y_e02, -m.e13, y_e03, -m.e14, y_e04, m.e1234, y_e0234, m.e01, y_s,
-                        m.e02, y_e12, m.e03, y_e13, m.e04, y_e14, m.e0123, y_e23, m.e0124, y_e24,
-                        m.e0134, y_e34, -m.e0234, y_e1234),
-                    w.v1),
-      .v2 = mul_add(S(2),
-                    dot(-m.e12, y_e01, -m.e23, y_e03, -m.e24, y_e04, -m.e1234, y_e0134, -m.e01,
-                        y_e12, m.e02, y_s, m.e03, y_e23, m.e04, y_e24, -m.e0123, y_e13, -m.e0124,
-                        y_e14, m.e0134, y_e1234, m.e0234, y_e34),
-                    w.v2),
-      .v3 = mul_add(S(2),
-                    dot(-m.e13, y_e01, m.e23, y_e02, -m.e34, y_e04, m.e1234, y_e0124, -m.e01, y_e13,
-                        -m.e02, y_e23, m.e03, y_s, m.e04, y_e34, m.e0123, y_e12, -m.e0124, y_e1234,
-                        -m.e0134, y_e14, -m.e0234, y_e24),
-                    w.v3),
-      .v4 = mul_add(S(2),
-                    dot(-m.e14, y_e01, m.e24, y_e02, m.e34, y_e03, -m.e1234, y_e0123, -m.e01, y_e14,
-                        -m.e02, y_e24, -m.e03, y_e34, m.e04, y_s, m.e0123, y_e1234, m.e0124, y_e12,
-                        m.e0134, y_e13, m.e0234, y_e23),
-                    w.v4)};
+  const S c_e01 =
+      dot(-m.e12, w.v2, -m.e13, w.v3, -m.e14, w.v4, m.e02, w.w12, m.e03, w.w13, m.e04, w.w14);
+  const S c_e02 =
+      dot(m.e12, w.v1, -m.e23, w.v3, -m.e24, w.v4, -m.e01, w.w12, m.e03, w.w23, m.e04, w.w24);
+  const S c_e12 = dot(m.e13, w.w23, m.e14, w.w24, -m.e23, w.w13, -m.e24, w.w14);
+  const S c_e03 =
+      dot(m.e13, w.v1, m.e23, w.v2, -m.e34, w.v4, -m.e01, w.w13, -m.e02, w.w23, m.e04, w.w34);
+  const S c_e13 = dot(-m.e12, w.w23, m.e14, w.w34, m.e23, w.w12, -m.e34, w.w14);
+  const S c_e23 = dot(m.e12, w.w13, -m.e13, w.w12, m.e24, w.w34, -m.e34, w.w24);
+  const S c_e0123 = dot(-m.e1234, w.v4, m.e0124, w.w34, -m.e0134, w.w24, m.e0234, w.w14);
+  const S c_e04 =
+      dot(m.e14, w.v1, m.e24, w.v2, m.e34, w.v3, -m.e01, w.w14, -m.e02, w.w24, -m.e03, w.w34);
+  const S c_e14 = dot(-m.e12, w.w24, -m.e13, w.w34, m.e24, w.w12, m.e34, w.w13);
+  const S c_e24 = dot(m.e12, w.w14, -m.e14, w.w12, -m.e23, w.w34, m.e34, w.w23);
+  const S c_e0124 = dot(m.e1234, w.v3, -m.e0123, w.w34, m.e0134, w.w23, -m.e0234, w.w13);
+  const S c_e34 = dot(m.e13, w.w14, -m.e14, w.w13, m.e23, w.w24, -m.e24, w.w23);
+  const S c_e0134 = dot(-m.e1234, w.v2, m.e0123, w.w24, -m.e0124, w.w23, m.e0234, w.w12);
+  const S c_e0234 = dot(m.e1234, w.v1, -m.e0123, w.w14, m.e0124, w.w13, -m.e0134, w.w12);
+  return {.w12 = mul_add(S(2),
+                         dot(-c_e12, m.s, -c_e13, m.e23, c_e23, m.e13, -c_e14, m.e24, c_e24, m.e14,
+                             c_e34, m.e1234),
+                         w.w12),
+          .w13 = mul_add(S(2),
+                         dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, -c_e14, m.e34, -c_e24,
+                             m.e1234, c_e34, m.e14),
+                         w.w13),
+          .w14 = mul_add(S(2),
+                         dot(c_e12, m.e24, c_e13, m.e34, c_e23, m.e1234, -c_e14, m.s, -c_e24, m.e12,
+                             -c_e34, m.e13),
+                         w.w14),
+          .w23 = mul_add(S(2),
+                         dot(-c_e12, m.e13, c_e13, m.e12, -c_e23, m.s, c_e14, m.e1234, -c_e24,
+                             m.e34, c_e34, m.e24),
+                         w.w23),
+          .w24 = mul_add(S(2),
+                         dot(-c_e12, m.e14, -c_e13, m.e1234, c_e23, m.e34, c_e14, m.e12, -c_e24,
+                             m.s, -c_e34, m.e23),
+                         w.w24),
+          .w34 = mul_add(S(2),
+                         dot(c_e12, m.e1234, -c_e13, m.e14, -c_e23, m.e24, c_e14, m.e13, c_e24,
+                             m.e23, -c_e34, m.s),
+                         w.w34),
+          .v1 = mul_add(
+              S(2),
+              dot(-c_e01, m.s, -c_e02, m.e12, c_e12, m.e02, -c_e03, m.e13, c_e13, m.e03, c_e23,
+                  m.e0123, -c_e0123, m.e23, -c_e04, m.e14, c_e14, m.e04, c_e24, m.e0124, -c_e0124,
+                  m.e24, c_e34, m.e0134, -c_e0134, m.e34, -c_e0234, m.e1234),
+              w.v1),
+          .v2 =
+              mul_add(S(2),
+                      dot(c_e01, m.e12, -c_e02, m.s, -c_e12, m.e01, -c_e03, m.e23, -c_e13, m.e0123,
+                          c_e23, m.e03, c_e0123, m.e13, -c_e04, m.e24, -c_e14, m.e0124, c_e24,
+                          m.e04, c_e0124, m.e14, c_e34, m.e0234, c_e0134, m.e1234, -c_e0234, m.e34),
+                      w.v2),
+          .v3 =
+              mul_add(S(2),
+                      dot(c_e01, m.e13, c_e02, m.e23, c_e12, m.e0123, -c_e03, m.s, -c_e13, m.e01,
+                          -c_e23, m.e02, -c_e0123, m.e12, -c_e04, m.e34, -c_e14, m.e0134, -c_e24,
+                          m.e0234, -c_e0124, m.e1234, c_e34, m.e04, c_e0134, m.e14, c_e0234, m.e24),
+                      w.v3),
+          .v4 =
+              mul_add(S(2),
+                      dot(c_e01, m.e14, c_e02, m.e24, c_e12, m.e0124, c_e03, m.e34, c_e13, m.e0134,
+                          c_e23, m.e0234, c_e0123, m.e1234, -c_e04, m.s, -c_e14, m.e01, -c_e24,
+                          m.e02, -c_e0124, m.e12, -c_e34, m.e03, -c_e0134, m.e13, -c_e0234, m.e23),
+                      w.v4)};
 }
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
-/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
-/// Cost: 166 mul, 142 add (118 fused).
+/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
+/// Cost: 188 mul, 163 add (146 fused).
 template <class S>
 [[nodiscard]] constexpr se4::Momentum<S> Ad_star_inverse(const Motor<S>& m,
                                                          const se4::Momentum<S>& mu) noexcept {
-  const S y_e1 = dot(-m.e1234, mu.p1, m.e34, mu.p2, -m.e24, mu.p3, m.e23, mu.p4);
-  const S y_e2 = dot(-m.e34, mu.p1, -m.e1234, mu.p2, m.e14, mu.p3, -m.e13, mu.p4);
-  const S y_e012 = dot(m.e1234, mu.l12, -m.e14, mu.l13, m.e13, mu.l14, -m.e24, mu.l23, m.e23,
-                       mu.l24, -m.s, mu.l34);
-  const S y_e3 = dot(m.e24, mu.p1, -m.e14, mu.p2, -m.e1234, mu.p3, m.e12, mu.p4);
-  const S y_e013 = dot(m.e14, mu.l12, m.e1234, mu.l13, -m.e12, mu.l14, -m.e34, mu.l23, m.s, mu.l24,
-                       m.e23, mu.l34);
-  const S y_e023 = dot(m.e24, mu.l12, m.e34, mu.l13, -m.s, mu.l14, m.e1234, mu.l23, -m.e12, mu.l24,
-                       -m.e13, mu.l34);
-  const S y_e123 = dot(-m.e14, mu.p1, -m.e24, mu.p2, -m.e34, mu.p3, m.s, mu.p4);
-  const S y_e4 = dot(-m.e23, mu.p1, m.e13, mu.p2, -m.e12, mu.p3, -m.e1234, mu.p4);
-  const S y_e014 = dot(-m.e13, mu.l12, m.e12, mu.l13, m.e1234, mu.l14, -m.s, mu.l23, -m.e34, mu.l24,
-                       m.e24, mu.l34);
-  const S y_e024 = dot(-m.e23, mu.l12, m.s, mu.l13, m.e34, mu.l14, m.e12, mu.l23, m.e1234, mu.l24,
-                       -m.e14, mu.l34);
-  const S y_e124 = dot(m.e13, mu.p1, m.e23, mu.p2, -m.s, mu.p3, -m.e34, mu.p4);
-  const S y_e034 = dot(-m.s, mu.l12, -m.e23, mu.l13, -m.e24, mu.l14, m.e13, mu.l23, m.e14, mu.l24,
-                       m.e1234, mu.l34);
-  const S y_e134 = dot(-m.e12, mu.p1, m.s, mu.p2, m.e23, mu.p3, m.e24, mu.p4);
-  const S y_e234 = dot(m.s, mu.p1, m.e12, mu.p2, m.e13, mu.p3, m.e14, mu.p4);
+  const S c_e0 = dot(-m.e0123, mu.p4, m.e0124, mu.p3, -m.e0134, mu.p2, m.e0234, mu.p1);
+  const S c_e1 = m.e1234 * mu.p1;
+  const S c_e2 = m.e1234 * mu.p2;
+  const S c_e012 = dot(m.e13, mu.l14, -m.e14, mu.l13, m.e23, mu.l24, -m.e24, mu.l23, m.e03, mu.p4,
+                       -m.e04, mu.p3);
+  const S c_e3 = m.e1234 * mu.p3;
+  const S c_e013 = dot(-m.e12, mu.l14, m.e14, mu.l12, m.e23, mu.l34, -m.e34, mu.l23, -m.e02, mu.p4,
+                       m.e04, mu.p2);
+  const S c_e023 = dot(-m.e12, mu.l24, -m.e13, mu.l34, m.e24, mu.l12, m.e34, mu.l13, m.e01, mu.p4,
+                       -m.e04, mu.p1);
+  const S c_e123 = dot(m.e14, mu.p1, m.e24, mu.p2, m.e34, mu.p3);
+  const S c_e4 = m.e1234 * mu.p4;
+  const S c_e014 = dot(m.e12, mu.l13, -m.e13, mu.l12, m.e24, mu.l34, -m.e34, mu.l24, m.e02, mu.p3,
+                       -m.e03, mu.p2);
+  const S c_e024 = dot(m.e12, mu.l23, -m.e14, mu.l34, -m.e23, mu.l12, m.e34, mu.l14, -m.e01, mu.p3,
+                       m.e03, mu.p1);
+  const S c_e124 = dot(m.e13, mu.p1, m.e23, mu.p2, -m.e34, mu.p4);
+  const S c_e034 = dot(m.e13, mu.l23, m.e14, mu.l24, -m.e23, mu.l13, -m.e24, mu.l14, m.e01, mu.p2,
+                       -m.e02, mu.p1);
+  const S c_e134 = dot(-m.e12, mu.p1, m.e23, mu.p3, m.e24, mu.p4);
+  const S c_e234 = dot(m.e12, mu.p2, m.e13, mu.p3, m.e14, mu.p4);
   return {
-      .l12 = mul_add(S(2),
-                     dot(m.e13, y_e014, -m.e14, y_e013, m.e23, y_e024, -m.e24, y_e023, -m.e01,
-                         y_e134, m.e02, y_e234, -m.e03, y_e4, m.e04, y_e3, m.e0123, y_e124,
-                         -m.e0124, y_e123, -m.e0134, y_e1, -m.e0234, y_e2),
-                     mu.l12),
-      .l13 = mul_add(S(2),
-                     dot(-m.e12, y_e014, m.e14, y_e012, m.e23, y_e034, -m.e34, y_e023, m.e01,
-                         y_e124, m.e02, y_e4, m.e03, y_e234, -m.e04, y_e2, m.e0123, y_e134, m.e0124,
-                         y_e1, -m.e0134, y_e123, -m.e0234, y_e3),
-                     mu.l13),
-      .l14 = mul_add(S(2),
-                     dot(m.e12, y_e013, -m.e13, y_e012, m.e24, y_e034, -m.e34, y_e024, -m.e01,
-                         y_e123, -m.e02, y_e3, m.e03, y_e2, m.e04, y_e234, -m.e0123, y_e1, m.e0124,
-                         y_e134, -m.e0134, y_e124, -m.e0234, y_e4),
-                     mu.l14),
-      .l23 = mul_add(S(2),
-                     dot(-m.e12, y_e024, -m.e13, y_e034, m.e24, y_e012, m.e34, y_e013, -m.e01, y_e4,
-                         m.e02, y_e124, m.e03, y_e134, m.e04, y_e1, -m.e0123, y_e234, m.e0124, y_e2,
-                         m.e0134, y_e3, -m.e0234, y_e123),
-                     mu.l23),
-      .l24 = mul_add(S(2),
-                     dot(m.e12, y_e023, -m.e14, y_e034, -m.e23, y_e012, m.e34, y_e014, m.e01, y_e3,
-                         -m.e02, y_e123, -m.e03, y_e1, m.e04, y_e134, -m.e0123, y_e2, -m.e0124,
-                         y_e234, m.e0134, y_e4, -m.e0234, y_e124),
-                     mu.l24),
-      .l34 = mul_add(S(2),
-                     dot(m.e13, y_e023, m.e14, y_e024, -m.e23, y_e013, -m.e24, y_e014, -m.e01, y_e2,
-                         m.e02, y_e1, -m.e03, y_e123, -m.e04, y_e124, -m.e0123, y_e3, -m.e0124,
-                         y_e4, -m.e0134, y_e234, -m.e0234, y_e134),
-                     mu.l34),
-      .p1 = mul_add(S(2), dot(m.e12, y_e134, -m.e13, y_e124, m.e14, y_e123, m.e1234, y_e1), mu.p1),
-      .p2 = mul_add(S(2), dot(-m.e12, y_e234, -m.e23, y_e124, m.e24, y_e123, m.e1234, y_e2), mu.p2),
-      .p3 = mul_add(S(2), dot(-m.e13, y_e234, -m.e23, y_e134, m.e34, y_e123, m.e1234, y_e3), mu.p3),
-      .p4 =
-          mul_add(S(2), dot(-m.e14, y_e234, -m.e24, y_e134, m.e34, y_e124, m.e1234, y_e4), mu.p4)};
+      .l12 =
+          mul_add(S(2),
+                  dot(c_e0, m.e34, c_e1, m.e0134, c_e2, m.e0234, c_e012, m.e1234, -c_e3, m.e04,
+                      -c_e013, m.e14, -c_e023, m.e24, c_e123, m.e0124, c_e4, m.e03, c_e014, m.e13,
+                      c_e024, m.e23, c_e124, m.e0123, -c_e034, m.s, -c_e134, m.e01, c_e234, m.e02),
+                  mu.l12),
+      .l13 = mul_add(
+          S(2),
+          dot(-c_e0, m.e24, -c_e1, m.e0124, c_e2, m.e04, c_e012, m.e14, c_e3, m.e0234, c_e013,
+              m.e1234, -c_e023, m.e34, c_e123, m.e0134, -c_e4, m.e02, -c_e014, m.e12, c_e024, m.s,
+              c_e124, m.e01, c_e034, m.e23, c_e134, m.e0123, c_e234, m.e03),
+          mu.l13),
+      .l14 =
+          mul_add(S(2),
+                  dot(c_e0, m.e23, c_e1, m.e0123, -c_e2, m.e03, -c_e012, m.e13, c_e3, m.e02, c_e013,
+                      m.e12, -c_e023, m.s, c_e123, m.e01, c_e4, m.e0234, c_e014, m.e1234, -c_e024,
+                      m.e34, -c_e124, m.e0134, c_e034, m.e24, c_e134, m.e0124, c_e234, m.e04),
+                  mu.l14),
+      .l23 = mul_add(
+          S(2),
+          dot(c_e0, m.e14, -c_e1, m.e04, -c_e2, m.e0124, c_e012, m.e24, -c_e3,
+              m.e0134, c_e013, m.e34, c_e023, m.e1234, c_e123, m.e0234, c_e4, m.e01, -c_e014, m.s,
+              -c_e024, m.e12, c_e124, m.e02, -c_e034, m.e13, c_e134, m.e03, -c_e234, m.e0123),
+          mu.l23),
+      .l24 = mul_add(
+          S(2),
+          dot(-c_e0, m.e13, c_e1, m.e03, c_e2, m.e0123, -c_e012, m.e23, -c_e3, m.e01, c_e013,
+              m.s, c_e023, m.e12, c_e123, m.e02, -c_e4, m.e0134, c_e014, m.e34, c_e024, m.e1234,
+              -c_e124, m.e0234, -c_e034, m.e14, c_e134, m.e04, -c_e234, m.e0124),
+          mu.l24),
+      .l34 =
+          mul_add(S(2),
+                  dot(c_e0, m.e12, -c_e1, m.e02, c_e2, m.e01, -c_e012, m.s, c_e3, m.e0123, -c_e013,
+                      m.e23, c_e023, m.e13, c_e123, m.e03, c_e4, m.e0124, -c_e014, m.e24, c_e024,
+                      m.e14, -c_e124, m.e04, c_e034, m.e1234, -c_e134, m.e0234, -c_e234, m.e0134),
+                  mu.l34),
+      .p1 = mul_add(S(2),
+                    dot(-c_e1, m.e1234, c_e2, m.e34, -c_e3, m.e24, -c_e123, m.e14, c_e4, m.e23,
+                        -c_e124, m.e13, c_e134, m.e12, c_e234, m.s),
+                    mu.p1),
+      .p2 = mul_add(S(2),
+                    dot(-c_e1, m.e34, -c_e2, m.e1234, c_e3, m.e14, -c_e123, m.e24, -c_e4, m.e13,
+                        -c_e124, m.e23, c_e134, m.s, -c_e234, m.e12),
+                    mu.p2),
+      .p3 = mul_add(S(2),
+                    dot(c_e1, m.e24, -c_e2, m.e14, -c_e3, m.e1234, -c_e123, m.e34, c_e4, m.e12,
+                        -c_e124, m.s, -c_e134, m.e23, -c_e234, m.e13),
+                    mu.p3),
+      .p4 = mul_add(S(2),
+                    dot(-c_e1, m.e23, c_e2, m.e13, -c_e3, m.e12, -c_e123, m.s, -c_e4, m.e1234,
+                        c_e124, m.e34, -c_e134, m.e24, -c_e234, m.e14),
+                    mu.p4)};
 }
 
 /// pairing: Momentum Rate -> Scalar

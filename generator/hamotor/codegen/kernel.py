@@ -12,7 +12,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, ratio, reverse_sign
+from hamotor.codegen.algebra import (
+    Algebra,
+    Blade,
+    Multivector,
+    Rational,
+    magnitude,
+    ratio,
+    reverse_sign,
+)
 from hamotor.codegen.element import Element
 from hamotor.codegen.nullsplit import hyperbolic_pairs, split_program
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
@@ -256,24 +264,23 @@ def sandwich_kernel(
 
     Where V ~V = 1, the change of X is a commutator with V.  It is sparse (what commutes with V
     drops out), so this costs far fewer operations than two products; for an even V its error is
-    proportional to the displacement, not to X.  Several forms say the same; the cheapest is taken.
-    The unit condition enters each exactly, as a multiple of 1 − V ~V, which the proof adds to the
-    definition.
+    proportional to the displacement, not to X.  Of several forms that say the same the cheapest is
+    taken whose rounding errors are bounded by the terms of X + [V, X] ~V.  The unit condition
+    enters each exactly, as a multiple of 1 − V ~V, which the proof adds to the definition.
     """
     v, x = parameters_for(versor, operand)
     odd = any(g % 2 for g in versor.grades)
     overall = -1 if odd and operand.grades[0] % 2 else 1
     kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
-    forms: list[SandwichForm | None] = [
+    forms = [
         _commutator_first(algebra, (v, x), kind, sign)
         for kind, sign in (kinds if odd else kinds[:1])
     ]
-    if not odd:
-        forms.append(_commutator_last(algebra, (v, x)))
+    last = None if odd else _commutator_last(algebra, (v, x))
+    if last is not None and _no_larger_terms(last, forms[0], result):
+        forms.append(last)
     kernels = [
-        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form)
-        for form in forms
-        if form is not None
+        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form) for form in forms
     ]
     return min(kernels, key=lambda kernel: kernel.program.cost.total)
 
@@ -291,6 +298,47 @@ class SandwichForm:
     staging: Staging
     half: PolynomialMultivector
     unit: PolynomialMultivector
+
+
+def _sizes(form: SandwichForm, result: Element) -> Mapping[str, Polynomial]:
+    """`half` multiplied out, with the absolute values of all terms: what its rounding scales with.
+
+    A component of `result` is read off by absolute values, too.
+    """
+    known: dict[str, Polynomial] = {}
+
+    def expanded(p: Polynomial) -> Polynomial:
+        total: Polynomial = {}
+        for monomial, x in p.items():
+            product: Polynomial = {(): magnitude(x)}
+            for factor in monomial:
+                product = poly.times(product, known.get(factor, {(factor,): 1}))
+            poly.add_scaled(total, product, 1)
+        return total
+
+    for name, p in form.staging.meaning.items():
+        known[name] = expanded(p)
+    half = {blade: expanded(p) for blade, p in form.half.items()}
+    sizes: dict[str, Polynomial] = {}
+    for component, functional in zip(result.components, result.reading, strict=True):
+        total = sizes.setdefault(component.name, {})
+        for blade, x in functional.items():
+            poly.add_scaled(total, half.get(blade, {}), magnitude(x))
+    return sizes
+
+
+def _no_larger_terms(form: SandwichForm, other: SandwichForm, result: Element) -> bool:
+    """Whether no term of `form` is missing or smaller in the other form, whatever the numbers are.
+
+    A term may cancel only because V is a unit: the long translation of a screw along a line that
+    it only turns is in such terms, and leaves its rounding error there.
+    """
+    allowed = _sizes(other, result)
+    return all(
+        x <= allowed[component].get(monomial, 0)
+        for component, sizes in _sizes(form, result).items()
+        for monomial, x in sizes.items()
+    )
 
 
 def _bound(
