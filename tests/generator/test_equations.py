@@ -12,7 +12,7 @@ from tests.generator.test_lagrangian import body_on
 
 from hamotor.errors import UsageError
 from hamotor.mechanics.coordinates import Coordinates
-from hamotor.mechanics.equations import equations
+from hamotor.mechanics.equations import _forques, _Names, equations
 from hamotor.mechanics.hamiltonian import Hamiltonian, coadjoint
 from hamotor.mechanics.naming import Generators
 from hamotor.scene import read_scene
@@ -155,3 +155,25 @@ def test_unknown_forms_and_styles_are_refused() -> None:
         equations(hamiltonian, "clasical")
     with pytest.raises(UsageError, match='unknown style "tex"'):
         equations(hamiltonian, style="tex")
+
+
+@pytest.mark.parametrize(("algebra", "group"), AFFINE)
+def test_printed_forques_are_those_of_the_hamiltonian(algebra: str, group: str) -> None:
+    hamiltonian = example(algebra, group)
+    (body,) = hamiltonian.bodies
+    names = _Names(hamiltonian, classical=False)
+    gradients, forques = _forques(hamiltonian, 0, names)
+    back = {symbol: root for root, symbol in names.lengths.items()}
+    symbols = {name.text: symbol for symbol, name in names.of_symbols.items()}
+    put_in = {symbols[e.left.text]: e.right[0] for e in gradients}
+    known = {x: sympy.Rational(k + 2, 11) for k, x in enumerate(_symbols_of(hamiltonian))}
+    for printed, wanted in zip(forques, hamiltonian.all_forques[0], strict=True):
+        whole = printed.subs(put_in).subs(back).subs(known)
+        assert abs(sympy.N(whole - wanted.subs(known), 40)) < 1e-30
+    assert gradients
+    assert len(forques) == len(body.rates)
+
+
+def _symbols_of(hamiltonian: Hamiltonian) -> list[Any]:
+    held = {x for forque in hamiltonian.all_forques for f in forque for x in f.free_symbols}
+    return sorted(held | set(VALUES), key=lambda x: str(x.name))
