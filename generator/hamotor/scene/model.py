@@ -161,9 +161,14 @@ class Scene:
     @cached_property
     def conserved(self) -> tuple[ConservedQuantity, ...]:
         """What the exact motion keeps constant: energy, momenta by symmetry, Casimirs."""
-        if self.potential is None:
-            return conserved_quantities(self)
-        return tuple(q for q in self.general.conserved if _has_a_formula(self, q))
+        if self.potential is not None:
+            return tuple(q for q in self.general.conserved if _has_a_formula(self, q))
+        found = conserved_quantities(self)
+        if not any(len(set(frame.moments)) < len(frame.moments) for frame in self.principal):
+            return found
+        # Only a symmetric body can keep momenta of its own frame.
+        own = [q for q in self.general.conserved if ".momentum." in q.name]
+        return (*found, *(q for q in own if _has_a_formula(self, q)))
 
     @cached_property
     def hamiltonian(self) -> Hamiltonian:

@@ -186,7 +186,9 @@ def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
 
 
 def _conserved(scene: Scene, quantity: ConservedQuantity) -> dict[str, Any]:
-    kind = quantity.name.rsplit(".", 1)[-1] if quantity.body else quantity.name.split(".", 1)[0]
+    kind = quantity.name.split(".", 1)[0]
+    if quantity.body:
+        kind = "momentum" if ".momentum." in quantity.name else quantity.name.rsplit(".", 1)[-1]
     coefficients = dict(quantity.coefficients)
     names = [body.name for body in scene.bodies]
     return {
