@@ -1,12 +1,13 @@
 """The rotation matrix a motor holds.
 
-A motor's rotor part is s + e23 e2∧e3 + e31 e3∧e1 + e12 e1∧e2 with quaternion (q0, q1, q2, q3) =
-(s, −e23, −e31, −e12); in the plane s = cos φ/2 and e12 = −sin φ/2.
+A motor's rotor part are its blades of directions alone: in space s + e23 e2∧e3 + e31 e3∧e1 + e12 e1∧e2
+with quaternion (q0, q1, q2, q3) = (s, −e23, −e31, −e12), in the plane s = cos φ/2 and e12 = −sin φ/2.
+What translates or scales adds blades with e0 or e∞, and a factor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 import numpy as np
@@ -14,28 +15,55 @@ from numpy.typing import NDArray
 
 Float = TypeVar("Float", np.float64, np.longdouble)
 
+AXES = "xyzw"
+"""Of positions, in order."""
+
+
+def has_attitude(algebra: str, blades: Iterable[str]) -> bool:
+    """Whether such motors turn bodies: not in space-time, nor where they bend lines.
+
+    Conformal maps that do so have blades with e0 and without e∞.
+    """
+    if algebra.startswith("cga"):
+        return not any("0" in blade and "i" not in blade for blade in blades)
+    return algebra != "sta"
+
 
 def rotation_matrices(
     blades: Mapping[str, NDArray[Float]],
 ) -> NDArray[Float]:
-    """R with v_world = R v_body, shape (n, 3, 3), or (n, 2, 2) for a motor without e23.
+    """R with v_world = R v_body, shape (n, d, d), d the highest index among the blades.
 
     `blades`: blade → components of the motors, shape (n,) each.  The size of the rotor part does
-    not matter: only its direction is used.
+    not matter: only its direction is used.  R_jk is the part along e_j of M e_k M~ / M M~.
     """
-    s, e12 = blades["s"], blades["e12"]
-    if "e23" not in blades:
-        size = s * s + e12 * e12
-        cos, sin = (s * s - e12 * e12) / size, -2 * s * e12 / size
-        return np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
-    w, x, y, z = s, -blades["e23"], -blades["e31"], -e12
-    twice = 2 / (w * w + x * x + y * y + z * z)
-    rows = [
-        [1 - twice * (y * y + z * z), twice * (x * y - w * z), twice * (x * z + w * y)],
-        [twice * (x * y + w * z), 1 - twice * (x * x + z * z), twice * (y * z - w * x)],
-        [twice * (x * z - w * y), twice * (y * z + w * x), 1 - twice * (x * x + y * y)],
+    dimension = max(int(index) for blade in blades for index in blade[1:] if index.isdecimal())
+    rotor = [
+        (blade[1:], x) for blade, x in blades.items() if not set(blade) & {"0", "i"}
     ]
-    return np.stack([np.stack(row, -1) for row in rows], -2)
+    size = np.sum([x * x for _, x in rotor], axis=0)
+    rotation = np.zeros((len(size), dimension, dimension), size.dtype)
+    for left, x in rotor:
+        for right, y in rotor:
+            for k in range(dimension):
+                sign, indices = _sorted(f"{left}{k + 1}{right[::-1]}")
+                if len(indices) == 1:
+                    rotation[:, int(indices) - 1, k] += sign * x * y / size
+    return rotation
+
+
+def _sorted(indices: str) -> tuple[int, str]:
+    """A product of orthonormal vectors as a sign and a blade."""
+    sign, rest = 1, ""
+    for index in indices:
+        larger = sum(other > index for other in rest)
+        sign *= (-1) ** larger
+        at = len(rest) - larger
+        if rest[:at].endswith(index):
+            rest = rest[: at - 1] + rest[at:]
+        else:
+            rest = rest[:at] + index + rest[at:]
+    return sign, rest
 
 
 def angle_between(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -65,6 +65,9 @@ def compare(one: Run, other: Run) -> Comparison:
     return Comparison(len(here), float(one.t[here[-1]]), tuple(differences))
 
 
+_KINDS = {"kg m^2/s": "angular momentum", "kg m/s": "linear momentum"}
+
+
 def _common_times(
     one: NDArray[np.float64], other: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -82,14 +85,17 @@ def _distances(
     one: Run, here: NDArray[np.intp], other: Run, there: NDArray[np.intp]
 ) -> Iterator[tuple[str, str, str, NDArray[np.float64]]]:
     for body in one.bodies:
-        attitudes = one.rotation(body)[here], other.rotation(body)[there]
         places = one.position(body)[here], other.position(body)[there]
-        if attitudes[0].shape != attitudes[1].shape or places[0].shape != places[1].shape:
+        if places[0].shape != places[1].shape:
             raise UsageError(f'body "{body}" moves in spaces of different dimension.')
-        yield body, "attitude", "rad", angle_between(*attitudes)
+        if one.has_attitude(body) and other.has_attitude(body):
+            attitudes = one.rotation(body)[here], other.rotation(body)[there]
+            yield body, "attitude", "rad", angle_between(*attitudes)
         yield body, "position", "m", np.linalg.norm(places[0] - places[1], axis=-1)
+        if f"{body}.scale" in one.units or f"{body}.scale" in other.units:
+            yield body, "scale", "1", np.abs(one.scale(body)[here] - other.scale(body)[there])
         for unit, names in _momenta_by_unit(one, other, body).items():
-            kind = "angular momentum" if "m^2" in unit else "linear momentum"
+            kind = _KINDS.get(unit, "momentum")
             change = [one.trajectory[n][here] - other.trajectory[n][there] for n in names]
             yield body, kind, unit, np.linalg.norm(np.stack(change, -1), axis=-1)
     energies = one.energy[here] - other.energy[there]

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.errors import ToolError, UsageError, suggest
+from hamotor.run.attitude import AXES
 
 ABI_VERSION = 1
 
@@ -96,8 +97,8 @@ class Description:
         ]
 
     def position_columns(self, body: str) -> list[int]:
-        """The columns of a body's position: x, y and, in space, z."""
-        return self._present(f"{body}.position.{axis}" for axis in "xyz")
+        """The columns of a body's position: x, y, in space z, and w in four dimensions."""
+        return self._present(f"{body}.position.{axis}" for axis in AXES)
 
     def _present(self, names: Any) -> list[int]:
         index = self.column_index

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from hamotor.run.attitude import rotation_matrices
+from hamotor.run.attitude import AXES, has_attitude, rotation_matrices
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +25,7 @@ Table = Mapping[str, Array]
 
 _BLUE, _VERMILLION, _GREEN = "#0072B2", "#D55E00", "#009E73"
 _PURPLE, _ORANGE, _SKY, _BLACK = "#CC79A7", "#E69F00", "#56B4E9", "#222222"
-_AXIS_COLOURS = (_VERMILLION, _GREEN, _BLUE)
+_AXIS_COLOURS = (_VERMILLION, _GREEN, _BLUE, _ORANGE)
 _BODY_COLOURS = (_BLACK, _PURPLE, _ORANGE, _SKY, _GREEN, _BLUE, _VERMILLION)
 _LINE_COLOURS = (_BLUE, _VERMILLION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK)
 _GREY = "#8a8a8a"
@@ -36,6 +36,7 @@ _TRIADS = 12
 _SPHERES_DRAWN = 3
 _COARSE_TURN = 0.35  # radians between rows: a line would cut through the sphere, dots do not lie
 _CROWDED = 100.0  # radians of trace on one sphere
+_WIDE_SCALE = 20.0
 _FLOOR = 1e-17
 _NOISE = 1e-13
 _EPSILON = float(np.finfo(float).eps)
@@ -68,14 +69,19 @@ def draw_path(report: Mapping[str, Any], table: Table) -> Figure:
     planar = f"{bodies[0]}.position.z" not in table and (
         "e23" not in report["final"][bodies[0]]["motor"]
     )
-    return _draw_planar(report, table) if planar else _draw_spatial(report, table)
+    plain = all(f"{body}.scale" not in table and _turns(body, report) for body in bodies)
+    return _draw_planar(report, table) if planar and plain else _draw_spatial(report, table)
 
 
 def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
+    """A column for the paths, one for each attitude, and one over time for sizes and for motors."""
     bodies = list(report["final"])
     moving = [body for body in bodies if _extent(_position(body, table)) > 0]
-    turning = bodies[:_SPHERES_DRAWN]
-    panels = len(turning) + (1 if moving else 0)
+    turning = [body for body in bodies if _turns(body, report)][:_SPHERES_DRAWN]
+    turning = [body for body in turning if _has_rotor(body, report)]
+    scaling = [body for body in bodies if f"{body}.scale" in table]
+    bending = [body for body in bodies if not _turns(body, report)][:_SPHERES_DRAWN]
+    panels = len(turning) + len(bending) + bool(moving) + bool(scaling)
     figure = _new_figure(5.2 * panels + 1.2, 8.2, layout=None)
     # Each column shows one thing in space and, below it, over time.
     grid = figure.add_gridspec(
@@ -102,14 +108,51 @@ def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
         _draw_sphere(space, body, rotation)
         _draw_turning(figure.add_subplot(grid[1, column]), table["t"], rotation)
         column += 1
-    _legend(figure, moving if len(moving) > 1 else [])
+    if scaling:
+        _draw_scales(figure.add_subplot(grid[:, column]), table, bodies)
+        column += 1
+    for body in bending:
+        _draw_motor(figure.add_subplot(grid[:, column]), body, report, table)
+        column += 1
+    dimension = max((_rotation(body, report, table).shape[-1] for body in turning), default=0)
+    _legend(figure, moving if len(moving) > 1 else [], axes=dimension)
     return figure
+
+
+def _draw_scales(axes: Axes, table: Table, bodies: Sequence[str]) -> None:
+    for number, body in enumerate(bodies):
+        axes.plot(table["t"], table[f"{body}.scale"], color=_body_colour(number), linewidth=1.2)
+    axes.set(xlabel="time (s)", ylabel="scale")
+    axes.set_title("size", fontsize=10)
+    low = min(float(table[f"{body}.scale"].min()) for body in bodies)
+    high = max(float(table[f"{body}.scale"].max()) for body in bodies)
+    if high > _WIDE_SCALE * low:
+        axes.set_yscale("log")
+    _quiet_grid(axes)
+
+
+def _draw_motor(axes: Axes, body: str, report: Mapping[str, Any], table: Table) -> None:
+    styles: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+    for number, blade in enumerate(report["final"][body]["motor"]):
+        axes.plot(
+            table["t"],
+            table[f"{body}.motor.{blade}"],
+            styles[number // len(_LINE_COLOURS) % len(styles)],
+            color=_LINE_COLOURS[number % len(_LINE_COLOURS)],
+            linewidth=1.0,
+            label=blade,
+        )
+    axes.set(xlabel="time (s)", ylabel="component")
+    axes.set_title(f"motor of {body}", fontsize=10)
+    axes.legend(fontsize=8, frameon=False, ncols=2)
+    _quiet_grid(axes)
 
 
 def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
     from matplotlib.lines import Line2D
 
-    styles: tuple[Literal["-", "--", ":"], ...] = ("-", "--", ":")
+    styles: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
+    styles = styles[: _position(moving[0], table).shape[-1]]
     for number, body in enumerate(moving):
         for values, style in zip(_position(body, table).T, styles, strict=False):
             axes.plot(table["t"], values, style, color=_body_colour(number), linewidth=1.0)
@@ -117,10 +160,10 @@ def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
     handles = [Line2D([], [], color=_BLACK, linestyle=style, linewidth=1.0) for style in styles]
     axes.legend(
         handles,
-        "xyz",
+        AXES[: len(styles)],
         loc="lower right",
         bbox_to_anchor=(1, 1),
-        ncols=3,
+        ncols=len(styles),
         fontsize=8,
         frameon=False,
     )
@@ -128,7 +171,7 @@ def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
 
 
 def _draw_turning(axes: Axes, t: Array, rotation: Array) -> None:
-    for axis, colour in enumerate(_AXIS_COLOURS):
+    for axis, colour in enumerate(_AXIS_COLOURS[: rotation.shape[-1]]):
         cosine = rotation[:, :, axis] @ rotation[0, :, axis]
         mark = "." if _is_coarse(rotation[:, :, axis]) else "-"
         axes.plot(t, cosine, mark, color=colour, linewidth=1.0, markersize=1.5, alpha=0.85)
@@ -144,7 +187,7 @@ def _quiet_grid(axes: Axes) -> None:
 
 
 def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequence[str]) -> None:
-    paths = {body: _position(body, table) for body in moving}
+    paths = {body: _in_three(_position(body, table)) for body in moving}
     everything = np.concatenate(list(paths.values()))
     length = 0.1 * _extent(everything)
     for number, (body, path) in enumerate(paths.items()):
@@ -152,10 +195,12 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
         axes.plot(*path.T, color=colour, linewidth=1.1, alpha=0.85)
         axes.scatter(*path[:1].T, color=colour, marker="o", s=30, depthshade=False)
         axes.scatter(*path[-1:].T, color=colour, marker="s", s=30, depthshade=False)
-        rotation = _rotation(body, report, table)
+        if not (_turns(body, report) and _has_rotor(body, report)):
+            continue
+        tips = length * _in_three(_rotation(body, report, table), 1)
         for row in _evenly(path):
-            for axis, axis_colour in enumerate(_AXIS_COLOURS):
-                tip = path[row] + length * rotation[row, :, axis]
+            for axis, axis_colour in enumerate(_AXIS_COLOURS[: tips.shape[-1]]):
+                tip = path[row] + tips[row, :, axis]
                 axes.plot(*np.stack([path[row], tip]).T, color=axis_colour, linewidth=1.2)
     low, high = everything.min(axis=0), everything.max(axis=0)
     middle = (low + high) / 2
@@ -168,7 +213,10 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
         ylabel="y (m)",
         zlabel="z (m)",
     )
-    axes.set_title("path of the body frame's origin\nand the body axes on the way", fontsize=10)
+    seen = ", seen along the fourth axis" if f"{moving[0]}.position.w" in table else ""
+    axes.set_title(
+        f"path of the body frame's origin\nand the body axes on the way{seen}", fontsize=10
+    )
     axes.set_box_aspect(half / half.max(), zoom=1.05)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(_few_ticks())
@@ -186,7 +234,12 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
             [np.cos(turns) * np.cos(meridian), np.cos(turns) * np.sin(meridian), np.sin(turns)]
         )
         axes.plot(*ring, color=_GREY, linewidth=0.4, alpha=0.6)
-    for axis, colour in enumerate(_AXIS_COLOURS):
+    unit = np.eye(3)
+    seen = "on the unit sphere"
+    if rotation.shape[-1] == 4:
+        seen = "in the unit ball, seen along the fourth axis"
+    rotation = _in_three(rotation, 1)
+    for axis, colour in enumerate(_AXIS_COLOURS[: rotation.shape[-1]]):
         tips = rotation[:, :, axis]
         if _is_coarse(tips):
             axes.plot(*tips.T, ".", color=colour, markersize=1.2, alpha=0.5)
@@ -197,7 +250,7 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
         axes.scatter(*tips[:1].T, color=colour, marker="o", s=30, depthshade=False)
         axes.scatter(*tips[-1:].T, color=colour, marker="s", s=30, depthshade=False)
     for axis, label in enumerate(("e1", "e2", "e3")):
-        tip = 1.22 * np.eye(3)[axis]
+        tip = 1.22 * unit[axis]
         axes.plot(*np.stack([tip / 1.22, tip]).T, color=_GREY, linewidth=1.0)
         # Above the traces, whatever their depth, on a halo that keeps it readable.
         axes.text(
@@ -212,7 +265,7 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
         )
     axes.set(xlim=(-1, 1), ylim=(-1, 1), zlim=(-1, 1))
     axes.set_axis_off()
-    axes.set_title(f"attitude of {body}\ntraces of its axes on the unit sphere", fontsize=10)
+    axes.set_title(f"attitude of {body}\ntraces of its axes {seen}", fontsize=10)
     axes.set_box_aspect((1, 1, 1), zoom=1.27)
 
 
@@ -373,8 +426,27 @@ def _few_ticks() -> Any:
 
 
 def _position(body: str, table: Table) -> Array:
-    names = [f"{body}.position.{axis}" for axis in "xyz"]
+    names = [f"{body}.position.{axis}" for axis in AXES]
     return np.stack([table[name] for name in names if name in table], axis=-1)
+
+
+def _in_three(vectors: Array, axis: int = -1) -> Array:
+    """Vectors of two dimensions with a zero, of four without their last component."""
+    missing = 3 - vectors.shape[axis]
+    if missing > 0:
+        shape = list(vectors.shape)
+        shape[axis] = missing
+        return np.concatenate([vectors, np.zeros(shape)], axis=axis)
+    return np.take(vectors, range(3), axis=axis)
+
+
+def _turns(body: str, report: Mapping[str, Any]) -> bool:
+    return has_attitude(report["algebra"], report["final"][body]["motor"])
+
+
+def _has_rotor(body: str, report: Mapping[str, Any]) -> bool:
+    """Whether anything but 1 turns directions; on translations nothing does."""
+    return any(not set(blade) & set("s0i") for blade in report["final"][body]["motor"])
 
 
 def _rotation(body: str, report: Mapping[str, Any], table: Table) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hamotor.run.attitude import Float, rotation_matrices
+from hamotor.run.attitude import Float, has_attitude, rotation_matrices
 from hamotor.run.build import CompiledScene
 from hamotor.run.library import Description
 from hamotor.run.runner import Outcome
@@ -44,7 +44,8 @@ def report(
     """The content of `run.json`.
 
     `final` per body: `motor` (body to world), `momentum` (body frame), `position` (world, of the
-    body frame's origin, m), `rotation` (v_world = R v_body) and `scale`.
+    body frame's origin, m), `rotation` (v_world = R v_body; null where the group bends lines) and
+    `scale`.
     """
     plan = outcome.plan
     said: Report = {
@@ -125,14 +126,18 @@ def final_state(body: str, description: Description, row: NDArray[Float]) -> dic
     """The state of one body in a row of the trajectory, as `run.json` tells it."""
     index = description.column_index
     motor = {blade: row[[index[f"{body}.motor.{blade}"]]] for blade in description.motor}
+    turns = has_attitude(description.algebra, motor)
+    scale = index.get(f"{body}.scale")
     return {
         "motor": {blade: _number(value[0]) for blade, value in motor.items()},
         "momentum": {
             name: _number(row[index[f"{body}.momentum.{name}"]]) for name in description.momentum
         },
         "position": [_number(row[k]) for k in description.position_columns(body)],
-        "rotation": [[_number(x) for x in line] for line in rotation_matrices(motor)[0]],
-        "scale": 1,
+        "rotation": [[_number(x) for x in line] for line in rotation_matrices(motor)[0]]
+        if turns
+        else None,
+        "scale": 1 if scale is None else _number(row[scale]),
     }
 
 

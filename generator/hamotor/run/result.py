@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.errors import NumericsError, UsageError, suggest
-from hamotor.run.attitude import rotation_matrices
+from hamotor.run.attitude import AXES, has_attitude, rotation_matrices
 from hamotor.run.dataset import REPORT, is_run, read_thinned, read_trajectory, thinned
 from hamotor.run.library import Description
 from hamotor.run.report import Report, summary
@@ -108,16 +108,30 @@ class Run:
         return self._stacked(body, "momentum")
 
     def position(self, body: str | None = None) -> Array:
-        """Where the body frame's origin is in the world, m: shape (n, 2 or 3)."""
+        """Where the body frame's origin is in the world, m: shape (n, 2, 3 or 4)."""
         body = self._body(body)
-        names = [f"{body}.position.{axis}" for axis in "xyz"]
+        names = [f"{body}.position.{axis}" for axis in AXES]
         return np.stack([self.trajectory[n] for n in names if n in self.trajectory], axis=-1)
 
     def rotation(self, body: str | None = None) -> Array:
-        """R with v_world = R v_body: shape (n, d, d)."""
+        """R with v_world = R v_body: shape (n, d, d).
+
+        Raises UsageError where the group bends lines, as `has_attitude` says.
+        """
         body = self._body(body)
         blades = self.final[body]["motor"]
+        if not self.has_attitude(body):
+            raise UsageError(f"{self.report['group']} does not keep lines straight: no rotation.")
         return rotation_matrices({b: self.trajectory[f"{body}.motor.{b}"] for b in blades})
+
+    def has_attitude(self, body: str | None = None) -> bool:
+        """Whether the body has a rotation: not in space-time, nor where lines are bent."""
+        return has_attitude(self.report["algebra"], self.final[self._body(body)]["motor"])
+
+    def scale(self, body: str | None = None) -> Array:
+        """By how much the body is enlarged: shape (n,); ones where the group keeps lengths."""
+        column = f"{self._body(body)}.scale"
+        return self.trajectory.get(column, np.ones_like(self.t))
 
     def summary(self) -> str:
         """A dozen lines for a person."""
