@@ -77,8 +77,8 @@ def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
     """A column for the paths, one for each attitude, and one over time for sizes and for motors."""
     bodies = list(report["final"])
     moving = [body for body in bodies if _extent(_position(body, table)) > 0]
-    turning = [body for body in bodies if _turns(body, report)][:_SPHERES_DRAWN]
-    turning = [body for body in turning if _has_rotor(body, report)]
+    turning = [body for body in bodies if _turns(body, report) and _has_rotor(body, report)]
+    turning = turning[:_SPHERES_DRAWN]
     scaling = [body for body in bodies if f"{body}.scale" in table]
     bending = [body for body in bodies if not _turns(body, report)][:_SPHERES_DRAWN]
     panels = len(turning) + len(bending) + bool(moving) + bool(scaling)
@@ -190,14 +190,17 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
     paths = {body: _in_three(_position(body, table)) for body in moving}
     everything = np.concatenate(list(paths.values()))
     length = 0.1 * _extent(everything)
+    turning = [body for body in moving if _turns(body, report) and _has_rotor(body, report)]
     for number, (body, path) in enumerate(paths.items()):
         colour = _body_colour(number)
         axes.plot(*path.T, color=colour, linewidth=1.1, alpha=0.85)
         axes.scatter(*path[:1].T, color=colour, marker="o", s=30, depthshade=False)
         axes.scatter(*path[-1:].T, color=colour, marker="s", s=30, depthshade=False)
-        if not (_turns(body, report) and _has_rotor(body, report)):
+        if body not in turning:
             continue
-        tips = length * _in_three(_rotation(body, report, table), 1)
+        size = table.get(f"{body}.scale", np.ones(len(path)))
+        lengths = length * size / size.max()
+        tips = lengths[:, None, None] * _in_three(_rotation(body, report, table), 1)
         for row in _evenly(path):
             for axis, axis_colour in enumerate(_AXIS_COLOURS[: tips.shape[-1]]):
                 tip = path[row] + tips[row, :, axis]
@@ -213,11 +216,14 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
         ylabel="y (m)",
         zlabel="z (m)",
     )
-    seen = ", seen along the fourth axis" if f"{moving[0]}.position.w" in table else ""
-    axes.set_title(
-        f"path of the body frame's origin\nand the body axes on the way{seen}", fontsize=10
-    )
-    axes.set_box_aspect(half / half.max(), zoom=1.05)
+    title = "path of the body frame's origin"
+    if turning:
+        title += "\nand the body axes on the way"
+    if f"{moving[0]}.position.w" in table:
+        title += ", seen along the fourth axis"
+    axes.set_title(title, fontsize=10)
+    # A tall box would reach beyond its panel.
+    axes.set_box_aspect(half / half.max(), zoom=1.05 if half[2] < half.max() else 0.85)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_major_locator(_few_ticks())
     axes.tick_params(labelsize=8)

@@ -40,7 +40,10 @@ MOST_SHOWN = 200
 
 def bundled_scenes() -> list[tuple[str, str]]:
     """The bundled scenes' names with their one-line descriptions, by name."""
-    return [(path.stem, read_scene(path).description) for path in sorted(BUNDLED.glob("*.toml"))]
+    return [
+        (path.stem, tomllib.loads(path.read_text(encoding="utf-8"))["description"])
+        for path in sorted(BUNDLED.glob("*.toml"))
+    ]
 
 
 def read_scene(scene: str | os.PathLike[str]) -> Scene | GeneralScene:
