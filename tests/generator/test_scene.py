@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from tests.rigid import parse_scene, read_scene
 
+from hamotor import scene as scenes
 from hamotor.scene import (
     GROUPS,
     Gravity,
@@ -200,8 +201,8 @@ def test_a_point_on_a_rigid_massless_rod_is_a_body_with_a_fixed_point() -> None:
 
 
 def test_bundled_scenes_are_the_promised_ones_and_describe_themselves() -> None:
-    scenes = dict(bundled_scenes())
-    assert set(scenes) >= {
+    described = dict(bundled_scenes())
+    assert set(described) >= {
         "dzhanibekov",
         "heavy_top",
         "planar",
@@ -209,12 +210,12 @@ def test_bundled_scenes_are_the_promised_ones_and_describe_themselves() -> None:
         "tumble",
         "two_bodies",
     }
-    assert all(20 < len(description) < 100 for description in scenes.values())
+    assert all(20 < len(description) < 100 for description in described.values())
 
 
 @pytest.mark.parametrize("name", [name for name, _ in bundled_scenes()])
 def test_a_bundled_scene_reads_and_its_lines_fit(name: str) -> None:
-    assert read_scene(name).name == name
+    assert scenes.read_scene(name).name == name
     lines = (BUNDLED / f"{name}.toml").read_text(encoding="utf-8").split("\n")
     assert max(map(len, lines)) <= 110
 
