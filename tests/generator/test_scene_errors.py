@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from hamotor.errors import UsageError, suggest
-from hamotor.scene import Scene, bundled_scenes, parse_scene, read_scene
+from hamotor.scene import Scene, parse_scene, read_scene
 from hamotor.scene.reading import BUNDLED
 
 TOP = """
@@ -368,7 +368,14 @@ def mutated(text: str, rng: random.Random) -> str:
     return "\n".join(lines)
 
 
-@pytest.mark.parametrize("name", [name for name, _ in bundled_scenes()])
+# The other general scenes take seconds for every hundred mutations and read by the same code.
+MUTATED = [
+    *("dzhanibekov", "heavy_top", "planar", "spring_pendulum", "tumble", "two_bodies"),
+    *("asymmetric_top", "kepler", "rocket"),
+]
+
+
+@pytest.mark.parametrize("name", MUTATED)
 def test_no_mutation_of_a_scene_raises_anything_but_a_usage_error(name: str) -> None:
     text = (BUNDLED / f"{name}.toml").read_text(encoding="utf-8")
     text = "\n".join(line.split("#")[0].rstrip() for line in text.split("\n") if line[:1] != "#")

@@ -1,8 +1,8 @@
 """The rotation matrix a motor holds.
 
-A motor's rotor part are its blades of directions alone: in space s + e23 e2∧e3 + e31 e3∧e1 + e12 e1∧e2
-with quaternion (q0, q1, q2, q3) = (s, −e23, −e31, −e12), in the plane s = cos φ/2 and e12 = −sin φ/2.
-What translates or scales adds blades with e0 or e∞, and a factor.
+A motor's rotor part are its blades of directions alone: in space s + e23 e2∧e3 + e31 e3∧e1 +
+e12 e1∧e2 with quaternion (q0, q1, q2, q3) = (s, −e23, −e31, −e12), in the plane s = cos φ/2 and
+e12 = −sin φ/2. What translates or scales adds blades with e0 or e∞, and a factor.
 """
 
 from __future__ import annotations
@@ -38,9 +38,7 @@ def rotation_matrices(
     not matter: only its direction is used.  R_jk is the part along e_j of M e_k M~ / M M~.
     """
     dimension = max(int(index) for blade in blades for index in blade[1:] if index.isdecimal())
-    rotor = [
-        (blade[1:], x) for blade, x in blades.items() if not set(blade) & {"0", "i"}
-    ]
+    rotor = [(blade[1:], x) for blade, x in blades.items() if not set(blade) & {"0", "i"}]
     size = np.sum([x * x for _, x in rotor], axis=0)
     rotation = np.zeros((len(size), dimension, dimension), size.dtype)
     for left, x in rotor:

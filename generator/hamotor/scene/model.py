@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -214,7 +214,18 @@ class Scene:
         for spring in self.springs:
             length = float(np.linalg.norm(self.spring_vector(spring)))
             potentials.append(0.5 * spring.stiffness * (length - spring.rest_length) ** 2)
+        if self.potential is not None:
+            potentials.append(self._initial_potential(self.potential))
         return kinetic, sum(potentials), kinetic + sum(abs(u) for u in potentials)
+
+    def _initial_potential(self, potential: Hamiltonian) -> float:
+        from hamotor.mechanics import numbers
+        from hamotor.mechanics.hamiltonian import TIME
+
+        known: dict[Any, Any] = {TIME: 0, **potential.parameters}
+        for coordinates, body in zip(potential.bodies, self.bodies, strict=True):
+            known |= numbers.places(coordinates, body.motor)
+        return float(numbers.evaluated(potential.energy, known))
 
     @cached_property
     def initial_spatial_momentum(self) -> Vector:
