@@ -197,7 +197,12 @@ def _add_run(parser: _Parser) -> None:
     parser.add_argument("--end", metavar="T", type=_positive, help="end time, s")
     parser.add_argument("--every", metavar="N", type=_count, help="record every N-th step")
     parser.add_argument("--scalar", metavar="S", default="double", help="double|float|long_double")
-    parser.add_argument("--kernels", metavar="K", default="generated", help="generated")
+    parser.add_argument(
+        "--kernels",
+        metavar="K",
+        default="generated",
+        help="generated|generic: generic ones are tables, to compare with",
+    )
     parser.add_argument("--out", metavar="DIR", help="where to write (default: runs/SCENE)")
     parser.add_argument("--csv", action="store_true", help="write trajectory.csv as well")
     parser.add_argument(
@@ -313,8 +318,6 @@ def _count(text: str) -> int:
 
 def _run(parsed: argparse.Namespace) -> int:
     _refuse_later_options(parsed, _LATER_RUN_OPTIONS)
-    if parsed.kernels == "generic":
-        raise UsageError('--kernels "generic" is not in this version yet.')
     from hamotor.run.result import RunFailed, RunInterrupted
     from hamotor.run.simulation import load
 

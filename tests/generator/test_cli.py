@@ -125,7 +125,6 @@ def test_a_rejected_text_exits_with_4(
         ("run toy --engine dask", "--engine is not in this version yet"),
         ("run toy --seed 0", "--seed is not in this version yet"),
         ("run toy --threads 2", "--threads is not in this version yet"),
-        ("run toy --kernels generic", "generic.*not in this version yet"),
         ("run toy --kernels hand", 'unknown kernels "hand"'),
         ("run toy --scalar half", 'unknown scalar "half"'),
         ("run toy --method eular", 'unknown method "eular".*Did you mean "euler"'),

@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     from hamotor.scene import GeneralScene, Scene
 
 SCALARS = ("double", "float", "long_double")
-KERNELS = ("generated",)
+KERNELS = ("generated", "generic")
 REPRESENTATIONS = ("ga", "matrix")
 _MATRIX_METHODS = ("auto", "rkmk4", "rk4")
+_GENERIC_METHODS = ("auto", "rkmk4")
 
 _AUTO_METHOD = "splitting2"
 _AUTO_REASON = (
@@ -124,6 +125,8 @@ class Simulation:
         norm.  Every `every`-th step is recorded, and always the first and the last state; with a
         tolerance, where the scene cannot know the steps, about two thousand rows if not given.
 
+        `kernels` "generic" runs the same scene with nothing generated but its Hamiltonian: products
+        of dense multivectors by table, slow, to compare with.
         `representation` "matrix" runs the scene in the classical form (R, x, Π, P) instead of
         motors, where its group is SE(3), SO(3) or SE(2): the same columns, for comparison.
 
@@ -140,10 +143,14 @@ class Simulation:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
         if representation == "matrix" and kernels != "generated":
             raise UsageError("the matrix form has no kernels; leave out one of the two options.")
-        methods = _MATRIX_METHODS if representation == "matrix" else self.methods
+        methods = self.methods
+        if representation == "matrix":
+            methods = _MATRIX_METHODS
+        elif kernels == "generic" and methods:
+            methods = _GENERIC_METHODS
         chosen = method or self.method
         if method is None and chosen not in methods and chosen in self.methods:
-            chosen = "auto"  # what the scene asks for, only the other representation has
+            chosen = "auto"  # what the scene asks for is of its specialised form only
         if methods:
             # Before the compiler runs: a slip of the pen should not take seconds to come back.
             check_method(chosen, dict.fromkeys(methods, 0))

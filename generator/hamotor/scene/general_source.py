@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
 from hamotor.codegen import cpp
+from hamotor.codegen.algebra import Blade, Rational
+from hamotor.codegen.element import Element
 from hamotor.codegen.program import Number, Program
+from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
+from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
+from hamotor.scene.model import Scene
 from hamotor.scene.source import literal_text, rendered, shortened, text_literal
 
 
@@ -54,11 +59,15 @@ class ProgramText:
         ]
 
 
-def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
-    """The text of the C++ file that defines `scene` over the runtime's headers.
+def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> str:
+    """The text of the C++ file that defines a scene over the runtime's headers.
+
+    kernels: `generated`, or `generic`: products by table, of dense multivectors.
 
     ValueError if its programs are not those of its Hamiltonian: a defect of ours.
     """
+    invariants = conserved_by(whole)
+    scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = scene.system
     prove_energy_balance(system)
     first = scene.bodies[0].coordinates
@@ -77,12 +86,13 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
             ", ".join(cpp.number_text(Fraction(int(x.p), int(x.q))) for x in b.coordinates.origin)
             for b in scene.bodies
         ]
-    own = [(q, x) for q, x in scene.invariants if x is not None and not has_column(scene, q.name)]
+    own = [(q, x) for q, x in invariants if x is not None and not has_column(scene, q.name)]
     return rendered(
         "general_scene.cpp.jinja",
         scene=scene,
         kernels=kernels,
         scalar=scalar.replace("_", " "),
+        tables=_tables(first) if kernels == "generic" else None,
         headers=scene.headers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,
@@ -117,8 +127,46 @@ def general_source(scene: GeneralScene, kernels: str, scalar: str) -> str:
         pivots=pivots,
         scales=len(names) > first.dimension,
         quantities=_quantities(system, [x for _, x in own]),
-        conserved=[conserved_entry(scene, q, own) for q, _ in scene.invariants],
+        conserved=[conserved_entry(scene, q, own) for q, _ in invariants],
     )
+
+
+def conserved_by(scene: Scene | GeneralScene) -> list[tuple[ConservedQuantity, Any]]:
+    """What a run of the scene reports as conserved; and each over the momenta, where it is."""
+    if isinstance(scene, GeneralScene):
+        return list(scene.invariants)
+    formulas = {q.name: x for q, x in scene.general.invariants}
+    return [(q, formulas[q.name]) for q in scene.conserved]
+
+
+def _tables(body: Coordinates) -> dict[str, Any]:
+    """A group as numbers: its metric, and how its types lie in the multivectors."""
+    group = body.group
+
+    def layout(element: Element) -> dict[str, Any]:
+        embeddings = [component.embedding for component in element.components]
+        return {
+            "names": [text_literal(c.name) for c in element.components],
+            "members": [c.name for c in element.components],
+            "embedding": _entries(embeddings),
+            "reading": _entries(element.reading),
+        }
+
+    return {
+        "gram": [[literal_text(float(x), "") for x in row] for row in body.algebra.gram],
+        "generators": [text_literal(g.name) for g in group.generators],
+        "element": layout(group.element),
+        "rate": layout(group.rate),
+        "momentum": layout(group.momentum),
+    }
+
+
+def _entries(rows: Sequence[Mapping[Blade, Rational]]) -> list[str]:
+    return [
+        f"hamotor::generic::Entry{{{k}, {blade}, {literal_text(float(x), '')}}}"
+        for k, row in enumerate(rows)
+        for blade, x in row.items()
+    ]
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:

@@ -21,9 +21,14 @@ from hamotor.errors import UsageError
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
 from hamotor.mechanics.straightline import straight_line
-from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
-from hamotor.scene.general_source import ProgramText, conserved_entry, has_column, motor_unit
+from hamotor.scene.general_source import (
+    ProgramText,
+    conserved_by,
+    conserved_entry,
+    has_column,
+    motor_unit,
+)
 from hamotor.scene.model import Scene
 from hamotor.scene.source import rendered, shortened, text_literal
 
@@ -77,14 +82,6 @@ def matrix_source(scene: Scene | GeneralScene, scalar: str) -> str:
         quantities={"count": len(own), "program": quantities} if own else None,
         conserved=[conserved_entry(scene, q, own) for q, _ in invariants],
     )
-
-
-def conserved_by(scene: Scene | GeneralScene) -> list[tuple[ConservedQuantity, Expr]]:
-    """What a run of the scene reports as conserved; and each over the momenta, where it is."""
-    if isinstance(scene, GeneralScene):
-        return list(scene.invariants)
-    formulas = {q.name: x for q, x in scene.general.invariants}
-    return [(q, formulas[q.name]) for q in scene.conserved]
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Body, Scene
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
-KERNELS = ("generated",)
+KERNELS = ("generated", "generic")
 SCALARS = {"double": "", "float": "F", "long_double": "L"}
 """The scalar types a scene compiles for, with the suffix of their literals."""
 SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
@@ -32,7 +32,7 @@ def scene_source(
             raise UsageError(
                 f'unknown {what} "{value}"; there is {", ".join(allowed)}.{suggest(value, allowed)}'
             )
-    if not isinstance(scene, Scene):
+    if not isinstance(scene, Scene) or kernels == "generic":
         from hamotor.scene.general_source import general_source
 
         return general_source(scene, kernels, scalar)

@@ -1,0 +1,83 @@
+"""Scenes with products by table instead of generated kernels: the same motion, to rounding."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.generator.hamiltonians import GROUPS
+
+import hamotor
+from hamotor.codegen.spec import bundled_algebra
+from hamotor.run.library import SceneLibrary
+from hamotor.scene import bundled_scenes
+
+BUNDLED = [name for name, _ in bundled_scenes()]
+STEPS = 20
+
+
+def rows(
+    simulation: hamotor.Simulation, scalar: str
+) -> tuple[list[SceneLibrary], list[np.ndarray]]:
+    libraries = [
+        simulation.compile(kernels=kernels, scalar=scalar).library
+        for kernels in ("generated", "generic")
+    ]
+    found = []
+    for library in libraries:
+        step = (simulation.step or 1e-3) / 4
+        with library.start("rkmk4", step=step, state=simulation.state) as run:
+            assert run.advance(STEPS, 0, None) == STEPS
+            found.append(run.observe_wide())
+    return libraries, found
+
+
+def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: float) -> None:
+    """To rounding of the largest number that has the same unit."""
+    columns = libraries[0].description.columns
+    assert columns == libraries[1].description.columns
+    assert [library.description.kernels for library in libraries] == ["generated", "generic"]
+    for k, column in enumerate(columns):
+        alike = [row[n] for row in found for n, c in enumerate(columns) if c.unit == column.unit]
+        size = max(1e-9, float(np.max(np.abs(alike))))
+        assert abs(found[0][k] - found[1][k]) <= 64 * STEPS * rounding * size, column.name
+
+
+@pytest.mark.parametrize("name", BUNDLED)
+def test_bundled_scenes_move_alike(name: str) -> None:
+    agree(*rows(hamotor.load(name), "double"), float(np.finfo(np.float64).eps))
+
+
+@pytest.mark.parametrize(("algebra", "group"), GROUPS)
+def test_every_group_moves_alike(algebra: str, group: str, tmp_path: Path) -> None:
+    generators = [
+        g.name
+        for found in bundled_algebra(algebra).groups
+        if found.name == group
+        for g in found.generators
+    ]
+    energy = " + ".join(f"{k + 2}/7*momentum(it).{g}^2" for k, g in enumerate(generators))
+    coupled = f"momentum(it).{generators[0]}*momentum(it).{generators[-1]}/5"
+    momenta = ", ".join(f"{g} = {0.3 - 0.1 * k:.1f}" for k, g in enumerate(generators))
+    path = tmp_path / "any.toml"
+    path.write_text(
+        f'algebra = "{algebra}"\ngroup = "{group}"\n[[body]]\nname = "it"\n'
+        f"momentum = {{ {momenta} }}\n"
+        f'[hamiltonian]\nexpression = "{energy} + {coupled} + motor(it).s^2/3"\n'
+        "[time]\nend = 1\nstep = 0.01\n"
+    )
+    agree(*rows(hamotor.load(path), "long_double"), float(np.finfo(np.longdouble).eps))
+
+
+def test_a_run_says_which_kernels_it_had() -> None:
+    simulation = hamotor.load("tumble")
+    assert simulation.method == "splitting2"
+    run = simulation.run(end=0.05, kernels="generic")
+    assert run.report["kernels"] == "generic"
+    assert run.report["method"] == "rkmk4"
+    assert "generic kernels" in run.summary()
+    with pytest.raises(hamotor.UsageError, match=r'"splitting2".*rkmk4'):
+        simulation.run(end=0.05, method="splitting2", kernels="generic")
+    with pytest.raises(hamotor.UsageError, match="matrix form has no kernels"):
+        simulation.run(end=0.05, kernels="generic", representation="matrix")
