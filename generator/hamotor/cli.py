@@ -434,7 +434,7 @@ def _show(parsed: argparse.Namespace) -> int:
 def _equations(scene: str, words: Sequence[str]) -> str:
     """`equations`, and then in any order `ga` or `classical`, `text` or `latex`."""
     from hamotor.mechanics.equations import FORMS, STYLES, equations
-    from hamotor.scene import read_scene
+    from hamotor.scene import GeneralScene, read_scene
 
     allowed = ("equations", *FORMS, *STYLES)
     for word in words:
@@ -445,7 +445,13 @@ def _equations(scene: str, words: Sequence[str]) -> str:
             )
     form = "classical" if "classical" in words else "ga"
     style = "latex" if "latex" in words else "text"
-    return equations(read_scene(scene).hamiltonian, form, style)
+    found = read_scene(scene)
+    if isinstance(found, GeneralScene) and found.lagrangian is not None:
+        raise UsageError(
+            f"{found.name}: no formula inverts ∂L/∂B, so that there is no H to print;"
+            " its rates are found by Newton's method"
+        )
+    return equations(found.hamiltonian, form, style)
 
 
 def _table(parsed: argparse.Namespace) -> int:

@@ -196,12 +196,19 @@ class Lagrangian:
                 if where == "at the initial state":
                     raise NotHyperregular(f"∂²L/∂B² is no number {shown}")
                 continue
-            matrix = np.array([float(x) for x in numbers]).reshape(size, size)
-            scale = 1 / np.sqrt(np.where(np.diag(matrix) == 0, 1, np.abs(np.diag(matrix))))
-            eigenvalues, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+            if not all(map(mpmath.isfinite, numbers)):
+                continue
+            # Scaled before it is rounded to double, which a growing L would overflow.
+            diagonal = [abs(numbers[k * (size + 1)]) or mpmath.mpf(1) for k in range(size)]
+            scale = [1 / mpmath.sqrt(x) for x in diagonal]
+            scaled = [float(x * scale[k // size] * scale[k % size]) for k, x in enumerate(numbers)]
+            matrix = np.array(scaled).reshape(size, size)
+            eigenvalues, vectors = np.linalg.eigh(matrix)
             smallest = int(np.argmin(np.abs(eigenvalues)))
             if np.abs(eigenvalues[smallest]) <= SINGULAR * np.abs(eigenvalues).max():
-                singular.append((shown, self._direction(vectors[:, smallest] * scale)))
+                singular.append(
+                    (shown, self._direction(vectors[:, smallest] * np.array(scale, dtype=float)))
+                )
                 continue
             regular += 1
             negative = int((eigenvalues < 0).sum())

@@ -19,9 +19,6 @@ def account(scene: Scene | GeneralScene) -> str:
 
 
 def _general(scene: GeneralScene) -> str:
-    from hamotor.mechanics.system import System
-
-    system = System(scene.hamiltonian)
     blocks = [
         [f"{scene.name}: {scene.description}" if scene.description else scene.name],
         [f"group  {scene.group.name} in {scene.group.algebra}, {_state_size(scene)} numbers"],
@@ -38,15 +35,29 @@ def _general(scene: GeneralScene) -> str:
     blocks.append(["acting", *(f"  {line}" for line in scene.acting or ["nothing"])])
     blocks.append(["conserved", *_conserved(scene)])
     blocks.append(["left out", *(f"  {line}" for line in _not_in(scene))])
-    cost = [
-        f"  H                {system.energy.cost}",
-        f"  ∂H/∂μ and dH     {system.gradient.cost}",
-    ]
-    if not scene.hamiltonian.conservative:
-        cost.append(f"  power         {system.power.cost}")
-    blocks.append(["cost of an evaluation", *cost])
+    blocks.append(["cost of an evaluation", *_cost(scene)])
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _cost(scene: GeneralScene) -> list[str]:
+    if scene.lagrangian is not None:
+        from hamotor.mechanics.legendre import LagrangianSystem
+
+        newton = LagrangianSystem(scene.lagrangian)
+        return [
+            "  ∂L/∂B = μ is solved for B by Newton's method: no formula inverts it",
+            f"  ∂L/∂B and ∂²L/∂B²  {newton.derivatives.cost}, in each iteration",
+            f"  −dL                {newton.forque.cost}",
+        ]
+    system = scene.system
+    lines = [
+        f"  H             {system.energy.cost}",
+        f"  ∂H/∂μ and dH  {system.gradient.cost}",
+    ]
+    if not scene.hamiltonian.conservative:
+        lines.append(f"  power         {system.power.cost}")
+    return lines
 
 
 def _named(numbers: Iterable[tuple[str, float]]) -> str:

@@ -26,6 +26,7 @@ from hamotor.scene.motors import Vector
 if TYPE_CHECKING:
     from hamotor.mechanics.coordinates import Coordinates
     from hamotor.mechanics.hamiltonian import Hamiltonian
+    from hamotor.mechanics.lagrangian import Lagrangian
     from hamotor.mechanics.system import System
 
 Exact = tuple[Fraction, ...]
@@ -70,6 +71,9 @@ class GeneralScene:
     group: Group
     bodies: tuple[GeneralBody, ...]
     hamiltonian: Hamiltonian
+    """H; where `lagrangian` is given, −L at fixed rates in its place."""
+    lagrangian: Lagrangian | None
+    """L, where the Legendre transform does not close in formulas."""
     potential: Hamiltonian
     """The part of H that is neither kinetic energy nor uniform gravity nor springs."""
     acting: tuple[str, ...]

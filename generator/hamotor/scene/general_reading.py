@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
+from functools import partial
 from typing import Any
 
 import sympy
@@ -15,9 +16,10 @@ from hamotor.codegen.group import LieGroup
 from hamotor.errors import UsageError, suggest
 from hamotor.mechanics import inertia, interactions
 from hamotor.mechanics.coordinates import Coordinates, Expr
+from hamotor.mechanics.evaluation import momentum_of_rates
 from hamotor.mechanics.hamiltonian import Hamiltonian
+from hamotor.mechanics.lagrangian import Lagrangian, NotHyperregular
 from hamotor.mechanics.language import Vector, read_number, read_vector
-from hamotor.mechanics.numbers import momenta_of_rates
 from hamotor.mechanics.vocabulary import Speaker, vocabulary
 from hamotor.scene import schema
 from hamotor.scene.general import (
@@ -64,6 +66,8 @@ class _System:
     drafts: Sequence[_Draft]
     energy: Expr = field(default_factory=lambda: sympy.Integer(0))
     potential: Expr = field(default_factory=lambda: sympy.Integer(0))
+    lagrangian: Expr = None
+    """L, where the scene gives one; `energy` then holds potentials only."""
     parameters: dict[Expr, Expr] = field(default_factory=dict)
     applied: list[list[Expr]] = field(default_factory=list)
     acting: list[str] = field(default_factory=list)
@@ -133,19 +137,33 @@ def read_general(
         _lagrangian(top.table(own, schema.LAGRANGIAN, heading=True), system)
     for number, values in enumerate(acting, 1):
         _interaction(top, number, dict(values), view, system)
-    hamiltonian = Hamiltonian(
-        tuple(draft.coordinates for draft in drafts),
-        system.energy,
-        system.parameters,
-        tuple(tuple(forque) for forque in system.applied),
-    )
+    coordinates = tuple(draft.coordinates for draft in drafts)
+    applied = tuple(tuple(forque) for forque in system.applied)
+    lagrangian = None
+    if own == "lagrangian":
+        function = system.lagrangian - system.energy
+        lagrangian = Lagrangian(coordinates, function, system.parameters, applied)
+        try:
+            lagrangian.require_hyperregular(
+                [draft.motor for draft in drafts], [_rates(draft) for draft in drafts]
+            )
+        except NotHyperregular as error:
+            top.fail(f"[lagrangian]: {error}")
+        hamiltonian = lagrangian.hamiltonian or lagrangian.at_fixed_rates
+        started = _started(top, drafts, lagrangian.momentum_of_rates)
+        if lagrangian.hamiltonian is not None:
+            lagrangian = None
+    else:
+        hamiltonian = Hamiltonian(coordinates, system.energy, system.parameters, applied)
+        started = _started(top, drafts, partial(momentum_of_rates, hamiltonian))
     return GeneralScene(
         name=name,
         description=top.text("description"),
         algebra=algebra.name,
         group=view,
-        bodies=_started(top, drafts, hamiltonian),
+        bodies=started,
         hamiltonian=hamiltonian,
+        lagrangian=lagrangian,
         potential=Hamiltonian(hamiltonian.bodies, system.potential, system.parameters),
         acting=tuple(system.acting),
         time=time,
@@ -295,6 +313,9 @@ def _parameters(table: Table, system: _System, reserved: str) -> dict[str, Any]:
 
 def _speakers(system: _System, *, rates: bool, momenta: bool) -> list[Speaker]:
     speakers = []
+    if system.lagrangian is not None:
+        given = [draft.coordinates for draft in system.drafts]
+        return [Speaker(body, body.rates if rates else None, momenta=False) for body in given]
     for draft in system.drafts:
         derivative = (
             tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
@@ -312,8 +333,12 @@ def _hamiltonian(table: Table, system: _System) -> None:
     system.acting.append(f"H = {text}")
 
 
-def _lagrangian(table: Table, _system: _System) -> None:
-    table.fail("Lagrangians are not in this version yet; give [hamiltonian]")
+def _lagrangian(table: Table, system: _System) -> None:
+    text = table.expression("expression")
+    speakers = [Speaker(d.coordinates, d.coordinates.rates, momenta=False) for d in system.drafts]
+    words = _vocabulary(table, speakers, system)
+    system.lagrangian = read_number(text, words, f"{table.file}: {table.place}: expression")
+    system.acting.append(f"L = {text}")
 
 
 def _vocabulary(
@@ -492,7 +517,9 @@ def _torque(table: Table, system: _System, number: int) -> None:
 def _damping(table: Table, system: _System, _number_of: int) -> None:
     draft = system.draft(table)
     linear, angular = table.number("linear"), table.number("angular")
-    rates = tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
+    rates = draft.coordinates.rates
+    if system.lagrangian is None:
+        rates = tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
     forque = interactions.damping_forque(
         draft.coordinates, rates, _number(linear), _number(angular)
     )
@@ -502,14 +529,20 @@ def _damping(table: Table, system: _System, _number_of: int) -> None:
     )
 
 
-def _started(top: Table, drafts: Sequence[_Draft], h: Hamiltonian) -> tuple[GeneralBody, ...]:
+MomentaOfRates = Callable[[Any, Any], tuple[tuple[float, ...], ...]]
+
+
+def _started(
+    top: Table, drafts: Sequence[_Draft], momenta_of: MomentaOfRates
+) -> tuple[GeneralBody, ...]:
     """The bodies with their momenta: as given, or of the rates that are given."""
     given = [_momentum(draft) for draft in drafts]
     rates = [_rates(draft) for draft in drafts]
     if any(momentum is None for momentum in given):
-        found = momenta_of_rates(h, [draft.motor for draft in drafts], rates)
-        if found is None:
-            top.fail("no momentum has the velocities given: H is not regular there; give momenta")
+        try:
+            found = momenta_of([draft.motor for draft in drafts], rates)
+        except UsageError as error:
+            top.fail(f"{error}; give momenta")
         given = [
             its_own if its_own is not None else of_rates
             for its_own, of_rates in zip(given, found, strict=True)

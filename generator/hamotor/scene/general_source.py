@@ -12,6 +12,7 @@ from hamotor.codegen.algebra import Blade, Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import Number, Program
 from hamotor.mechanics.coordinates import Coordinates
+from hamotor.mechanics.legendre import LagrangianSystem
 from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
@@ -69,12 +70,8 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
     invariants = conserved_by(whole)
     scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = scene.system
-    prove_energy_balance(system)
     first = scene.bodies[0].coordinates
-    count = len(scene.bodies)
-    gradient = ProgramText(system.gradient)
-    forques = [x for name, x in system.gradient.outputs if name.startswith("forque")]
-    powered = not scene.hamiltonian.conservative
+    own_system = _lagrangian(scene) if scene.lagrangian is not None else _hamiltonian(scene)
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
     names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
     units = ["m"] * first.dimension
@@ -97,18 +94,8 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,
         group=scene.group.name,
-        hamiltonian=shortened(str(scene.hamiltonian.energy)),
         bodies=[text_literal(body.name) for body in scene.bodies],
-        has_forque=any(x != Number(0) for x in forques),
-        energy=ProgramText(system.energy),
-        gradient={
-            "cost": gradient.cost,
-            "lines": gradient.lines,
-            "used": gradient.used,
-            "rates": gradient.outputs("rate", count),
-            "forques": gradient.outputs("forque", count),
-        },
-        power=ProgramText(system.power) if powered else None,
+        **own_system,
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
         motor_units=[text_literal(motor_unit(scene, name)) for name in scene.group.motor],
         momentum_units=[text_literal(unit) for unit in scene.group.units],
@@ -167,6 +154,36 @@ def _entries(rows: Sequence[Mapping[Blade, Rational]]) -> list[str]:
         for k, row in enumerate(rows)
         for blade, x in row.items()
     ]
+
+
+def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
+    """The system of an H in formulas, for the template."""
+    system, count = scene.system, len(scene.bodies)
+    prove_energy_balance(system)
+    gradient = ProgramText(system.gradient)
+    forques = [x for name, x in system.gradient.outputs if name.startswith("forque")]
+    return {
+        "lagrangian": None,
+        "hamiltonian": shortened(str(scene.hamiltonian.energy)),
+        "has_forque": any(x != Number(0) for x in forques),
+        "energy": ProgramText(system.energy),
+        "gradient": {
+            "cost": gradient.cost,
+            "lines": gradient.lines,
+            "used": gradient.used,
+            "rates": gradient.outputs("rate", count),
+            "forques": gradient.outputs("forque", count),
+        },
+        "power": None if scene.hamiltonian.conservative else ProgramText(system.power),
+    }
+
+
+def _lagrangian(scene: GeneralScene) -> dict[str, Any]:
+    """The system of an L whose rates are found by Newton's method, for the template."""
+    assert scene.lagrangian is not None
+    values = LagrangianSystem(scene.lagrangian).template_values()
+    text = rendered("lagrangian.cpp.jinja", algebra=scene.algebra, group=scene.group.name, **values)
+    return {"lagrangian": text}
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from hamotor.scene.conserved import ConservedQuantity
 
 if TYPE_CHECKING:
+    from hamotor.mechanics.evaluation import Values
     from hamotor.scene.general import GeneralScene
 
 
@@ -14,6 +15,8 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
     """Each conserved quantity; and what it is over the momenta, if the scene computes it."""
     from hamotor.mechanics.symmetries import Conserved, conserved
 
+    if scene.lagrangian is not None:
+        return (_of_newton(scene),)
     group = scene.group
     start = _at_the_start(scene)
 
@@ -46,31 +49,36 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
     )
 
 
+def _of_newton(scene: GeneralScene) -> tuple[ConservedQuantity, None]:
+    """The energy: symmetries are not sought where H is no formula."""
+    constant = scene.hamiltonian.conservative
+    words = "μ·B − L" if constant else "μ·B − L less the work of time and of applied forques"
+    name = "energy" if constant else "energy_balance"
+    return ConservedQuantity(name, "J", words, (), "", ("energy",), 0.0), None
+
+
 CANCELLED = 1e-9
 """A sum is near zero if it is less than so much of its terms."""
 
 
-def _at_the_start(scene: GeneralScene) -> dict[Any, Any]:
+def _at_the_start(scene: GeneralScene) -> Values:
     """What every symbol of H is at the start, as mpmath numbers."""
     import mpmath
 
-    from hamotor.mechanics.hamiltonian import TIME
-    from hamotor.mechanics.numbers import places
+    from hamotor.mechanics.evaluation import place, values_of
 
-    known: dict[Any, Any] = {TIME: mpmath.mpf(0)}
-    for symbol, value in scene.hamiltonian.parameters.items():
-        known[symbol] = mpmath.mpf(value.p) / value.q
+    known = values_of(scene.hamiltonian.parameters)
     for body in scene.bodies:
-        known |= places(body.coordinates, body.motor)
+        known = place(body.coordinates, body.motor, known)
         known |= dict(zip(body.coordinates.momenta, map(mpmath.mpf, body.momentum), strict=True))
     return known
 
 
-def _size(total: Any, known: dict[Any, Any]) -> tuple[float, float]:
+def _size(total: Any, known: Values) -> tuple[float, float]:
     """A sum's value, and the sum of its terms' magnitudes."""
     import sympy
 
-    from hamotor.mechanics.numbers import evaluated
+    from hamotor.mechanics.evaluation import evaluated
 
-    terms = [evaluated(term, known) for term in sympy.Add.make_args(total)]
+    terms = evaluated(sympy.Add.make_args(total), known)
     return float(sum(terms)), float(sum(map(abs, terms)))
