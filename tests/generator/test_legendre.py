@@ -59,7 +59,11 @@ def computed(
     """Energy, rates, forques and, if there is one, power from the compiled system."""
     body, system = lagrangian.bodies[0], LagrangianSystem(lagrangian)
     group = body.group.name
-    text = render("lagrangian.cpp.jinja", algebra=algebra, group=group, **system.template_values())
+    text = render(
+        "lagrangian.cpp.jinja",
+        group_type=f"hamotor::{algebra}::{group}",
+        **system.template_values(),
+    )
     source = folder / "system.cpp"
     source.write_text(
         MAIN.format(

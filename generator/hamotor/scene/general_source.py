@@ -12,6 +12,7 @@ from hamotor.codegen.algebra import Blade, Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import Number, Program
 from hamotor.mechanics.coordinates import Coordinates
+from hamotor.mechanics.lagrangian import Lagrangian
 from hamotor.mechanics.legendre import LagrangianSystem
 from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
@@ -71,7 +72,13 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
     scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = scene.system
     first = scene.bodies[0].coordinates
-    own_system = _lagrangian(scene) if scene.lagrangian is not None else _hamiltonian(scene)
+    group_type = f"hamotor::{scene.algebra}::{scene.group.name}"
+    if kernels == "generic":
+        group_type = "hamotor::generic::Group<Tables>"
+    if scene.lagrangian is not None:
+        own_system = _lagrangian(scene.lagrangian, group_type)
+    else:
+        own_system = _hamiltonian(scene)
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
     names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
     units = ["m"] * first.dimension
@@ -94,6 +101,7 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,
         group=scene.group.name,
+        group_type=group_type,
         bodies=[text_literal(body.name) for body in scene.bodies],
         **own_system,
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
@@ -178,12 +186,10 @@ def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
     }
 
 
-def _lagrangian(scene: GeneralScene) -> dict[str, Any]:
+def _lagrangian(lagrangian: Lagrangian, group_type: str) -> dict[str, Any]:
     """The system of an L whose rates are found by Newton's method, for the template."""
-    assert scene.lagrangian is not None
-    values = LagrangianSystem(scene.lagrangian).template_values()
-    text = rendered("lagrangian.cpp.jinja", algebra=scene.algebra, group=scene.group.name, **values)
-    return {"lagrangian": text}
+    values = LagrangianSystem(lagrangian).template_values()
+    return {"lagrangian": rendered("lagrangian.cpp.jinja", group_type=group_type, **values)}
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:

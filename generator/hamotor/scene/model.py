@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -219,13 +219,12 @@ class Scene:
         return kinetic, sum(potentials), kinetic + sum(abs(u) for u in potentials)
 
     def _initial_potential(self, potential: Hamiltonian) -> float:
-        from hamotor.mechanics import numbers
-        from hamotor.mechanics.hamiltonian import TIME
+        from hamotor.mechanics.evaluation import evaluated, place, values_of
 
-        known: dict[Any, Any] = {TIME: 0, **potential.parameters}
+        known = values_of(potential.parameters)
         for coordinates, body in zip(potential.bodies, self.bodies, strict=True):
-            known |= numbers.places(coordinates, body.motor)
-        return float(numbers.evaluated(potential.energy, known))
+            known = place(coordinates, body.motor, known)
+        return float(evaluated([potential.energy], known)[0])
 
     @cached_property
     def initial_spatial_momentum(self) -> Vector:
