@@ -62,6 +62,7 @@ def computed(
     text = render(
         "lagrangian.cpp.jinja",
         group_type=f"hamotor::{algebra}::{group}",
+        by_name=False,
         **system.template_values(),
     )
     source = folder / "system.cpp"

@@ -72,11 +72,12 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
     scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = scene.system
     first = scene.bodies[0].coordinates
+    by_name = kernels == "generic"
     group_type = f"hamotor::{scene.algebra}::{scene.group.name}"
-    if kernels == "generic":
+    if by_name:
         group_type = "hamotor::generic::Group<Tables>"
     if scene.lagrangian is not None:
-        own_system = _lagrangian(scene.lagrangian, group_type)
+        own_system = _lagrangian(scene.lagrangian, group_type, by_name)
     else:
         own_system = _hamiltonian(scene)
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
@@ -186,10 +187,11 @@ def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
     }
 
 
-def _lagrangian(lagrangian: Lagrangian, group_type: str) -> dict[str, Any]:
+def _lagrangian(lagrangian: Lagrangian, group_type: str, by_name: bool) -> dict[str, Any]:
     """The system of an L whose rates are found by Newton's method, for the template."""
     values = LagrangianSystem(lagrangian).template_values()
-    return {"lagrangian": rendered("lagrangian.cpp.jinja", group_type=group_type, **values)}
+    text = rendered("lagrangian.cpp.jinja", group_type=group_type, by_name=by_name, **values)
+    return {"lagrangian": text}
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:
