@@ -488,11 +488,11 @@ def _scenes() -> list[tuple[str, str]]:
 
 
 def _methods() -> list[tuple[str, str]]:
+    from hamotor.scene import METHODS
+
     return [
         ("auto", "what suits the scene; run.json says which and why"),
-        ("rkmk4", "Runge-Kutta-Munthe-Kaas, order 4, explicit"),
-        ("splitting2", "Strang splitting, order 2, symplectic, keeps coadjoint orbits exactly"),
-        ("rk4", "classical Runge-Kutta, order 4, on matrices: with --representation matrix only"),
+        *((m.name, f"order {m.order}: {m.description}") for m in METHODS),
     ]
 
 

@@ -199,14 +199,14 @@ def test_list_names_what_there_is(capsys: pytest.CaptureFixture[str]) -> None:
         assert expected in names
 
 
-def test_the_methods_listed_are_those_a_scene_may_name(
+def test_the_methods_listed_are_those_a_run_may_name(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    from hamotor.scene import METHODS
+    from hamotor.scene import METHOD_NAMES, METHODS
 
     main(["list", "methods"])
     names = [line.split()[0] for line in capsys.readouterr().out.splitlines()]
-    assert sorted(names) == sorted((*METHODS, "rk4"))  # rk4: in matrices only
+    assert sorted(names) == sorted({*METHOD_NAMES, *(method.name for method in METHODS)})
 
 
 def test_show_explains_a_scene(capsys: pytest.CaptureFixture[str]) -> None:

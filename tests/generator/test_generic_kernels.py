@@ -21,7 +21,7 @@ def rows(
     simulation: hamotor.Simulation, scalar: str
 ) -> tuple[list[SceneLibrary], list[np.ndarray]]:
     libraries = [
-        simulation.compile(kernels=kernels, scalar=scalar).library
+        simulation.compile(kernels=kernels, scalar=scalar, method="rkmk4").library
         for kernels in ("generated", "generic")
     ]
     found = []

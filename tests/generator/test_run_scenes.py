@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import hamotor
-from hamotor.scene import bundled_scenes
+from hamotor.run.simulation import choose_method
+from hamotor.scene import METHODS, Form, bundled_scenes, methods_offered
 
 SCENES = [name for name, _ in bundled_scenes()]
 PACKAGE = Path(hamotor.__file__).parents[1]
@@ -124,7 +125,7 @@ def test_the_second_command_does_not_compile_again(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_keeps_what_was_computed_and_exits_with_130(tmp_path: Path) -> None:
-    hamotor.load("tumble").compile()
+    hamotor.load("tumble").compile(method="splitting2")
     options = "--end 1e9 --every 10000 --no-pictures --json --out kept"
     process = command("run", "tumble", *options.split(), folder=tmp_path)
     while not list(tmp_path.glob("kept/.running-*/0/trajectory")):
@@ -147,3 +148,29 @@ def test_the_api_does_what_the_readme_promises() -> None:
     assert run.t[-1] == 10.0
     assert run.motor("handle").shape == (len(run.t), 8)
     assert run.rotation("handle").shape == (len(run.t), 3, 3)
+
+
+def test_a_scene_is_compiled_with_the_one_method_it_is_run_with() -> None:
+    simulation = hamotor.load("heavy_top")
+    compiled = simulation.compile(method="splitting6")
+    assert compiled.description.methods == simulation.methods, "the runtime and the list agree"
+    state = simulation.state
+    with compiled.library.start("splitting6", step=0.01, state=state) as live:
+        assert live.advance(3, 1, None) == 3
+    with pytest.raises(hamotor.HamotorError, match="would not start"):
+        compiled.library.start("rkmk4", step=0.01, state=state)
+
+
+@pytest.mark.parametrize(
+    "method", [m.name for m in METHODS if m.forms == Form.SPLIT and m.order > 2]
+)
+def test_higher_orders_meet_a_reference_in_longer_steps(method: str) -> None:
+    simulation = hamotor.load("heavy_top")
+    reference = simulation.run(method="rkmk4", end=0.5, step=5e-5, every=100)
+    run = simulation.run(method=method, end=0.5, step=5e-3, every=1)
+    assert hamotor.compare(reference, run).largest < (1e-6 if method == "splitting4" else 1e-9)
+
+
+def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:
+    with pytest.raises(hamotor.UsageError, match="this scene offers auto, rkmk4"):
+        choose_method("splitting4", methods_offered(Form.GENERAL))

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <type_traits>
 #include <vector>
 
 #include "sample_systems.hpp"
@@ -50,6 +51,71 @@ TEST(Order, of_a_forced_body_with_a_fixed_point) { expect_orders(sample::forced_
 TEST(Order, of_a_forced_body_in_the_plane) { expect_orders(sample::forced_se2()); }
 TEST(Order, of_two_bodies_in_space) { expect_orders(sample::two_bodies_se3()); }
 TEST(Order, of_two_bodies_in_the_plane) { expect_orders(sample::two_bodies_se2()); }
+/// Against order 10 in shorter steps, in long double: an error of 1e-17 is then one of the method.
+template <int order, class System>
+double splitting_order(const System& system, int coarse) {
+  using hamotor::Splitting;
+  const auto after = [&]<int of>(std::integral_constant<int, of>, int steps) {
+    auto state = generic_state(system);
+    Splitting<System, of> method;
+    const auto h = 1 / static_cast<long double>(steps);
+    for (int k = 0; k < steps; ++k) method.do_step(system, state, 0, h);
+    return state;
+  };
+  const auto reference = after(std::integral_constant<int, 10>{}, 6 * coarse);
+  const auto error = [&](int steps) {
+    return distance(after(std::integral_constant<int, order>{}, steps), reference);
+  };
+  const double fine = error(2 * coarse);
+  EXPECT_GT(fine, 1e-17) << "nothing to measure";
+  return std::log2(error(coarse) / fine);
+}
+
+/// The least steps in which each order is seen: fewer where less acts.
+struct Steps {
+  int four;
+  int six;
+  int eight;
+};
+
+template <class System>
+void expect_splitting_orders(const System& system, const Steps& coarse) {
+  EXPECT_NEAR((splitting_order<4>(system, coarse.four)), 4, 0.1);
+  EXPECT_NEAR((splitting_order<6>(system, coarse.six)), 6, 0.1);
+  EXPECT_NEAR((splitting_order<8>(system, coarse.eight)), 8, 0.1);
+}
+
+TEST(Splitting, has_its_order_for_free_and_forced_bodies) {
+  using Wide = long double;
+  expect_splitting_orders(sample::free_se3<Wide>(), {20, 10, 3});
+  expect_splitting_orders(sample::free_so3<Wide>(), {20, 10, 3});
+  expect_splitting_orders(sample::forced_se3<Wide>(), {20, 20, 40});
+  expect_splitting_orders(sample::forced_so3<Wide>(), {30, 20, 14});
+  expect_splitting_orders(sample::two_bodies_se3<Wide>(), {20, 20, 30});
+}
+
+TEST(Splitting, has_its_order_where_the_free_motion_is_exact) {
+  using Wide = long double;
+  expect_splitting_orders(sample::forced_se2<Wide>(), {20, 10, 10});
+  expect_splitting_orders(sample::two_bodies_se2<Wide>(), {40, 40, 30});
+}
+
+TEST(Splitting, of_order_10_has_order_10) {
+  const auto system = sample::forced_so3<long double>();
+  auto state = generic_state(system);
+  using System = std::remove_const_t<decltype(system)>;
+  const auto after = [&](int steps) {
+    auto end = state;
+    hamotor::Splitting10<System> method;
+    for (int k = 0; k < steps; ++k) {
+      method.do_step(system, end, 0, 1 / static_cast<long double>(steps));
+    }
+    return end;
+  };
+  const auto reference = after(30);
+  EXPECT_NEAR(std::log2(distance(after(5), reference) / distance(after(10), reference)), 10, 0.3);
+}
+
 TEST(Order, of_rkmk4_for_a_free_body_in_the_plane) {
   const auto system = sample::free_se2();
   EXPECT_NEAR(measured_order<Rkmk4<std::remove_const_t<decltype(system)>>>(system, 10), 4, 0.1);
@@ -84,6 +150,30 @@ void expect_reversible(const System& system) {
   EXPECT_GT(distance(state, start), 0.1);
   for (int k = 0; k < 200; ++k) method.do_step(system, state, 0, -0.02);
   EXPECT_LT(distance(state, start), 1e-13);
+}
+
+template <class Method, class System>
+void expect_returns(const System& system) {
+  const auto start = generic_state(system);
+  Method method;
+  auto state = start;
+  for (int k = 0; k < 50; ++k) method.do_step(system, state, 0, 0.05);
+  EXPECT_GT(distance(state, start), 0.1);
+  for (int k = 0; k < 50; ++k) method.do_step(system, state, 0, -0.05);
+  EXPECT_LT(distance(state, start), 2e-13);
+}
+
+template <class System>
+void expect_splittings_return(const System& system) {
+  expect_returns<hamotor::Splitting4<System>>(system);
+  expect_returns<hamotor::Splitting6<System>>(system);
+  expect_returns<hamotor::Splitting8<System>>(system);
+}
+
+TEST(Splitting, is_time_reversible_to_rounding) {
+  expect_splittings_return(sample::free_se3());
+  expect_splittings_return(sample::forced_so3());
+  expect_splittings_return(sample::forced_se2());
 }
 
 TEST(Splitting2, is_time_reversible_to_rounding) {
@@ -158,6 +248,19 @@ TEST(Splitting2, is_symplectic_and_rkmk4_is_not) {
   expect_symplectic(sample::forced_se3());
   expect_symplectic(sample::forced_so3());
   expect_symplectic(sample::forced_se2());
+}
+
+template <class System>
+void expect_symplectic_splittings(const System& system) {
+  EXPECT_LT(symplectic_defect<hamotor::Splitting4<System>>(system, 0.2), 2e-9);
+  EXPECT_LT(symplectic_defect<hamotor::Splitting6<System>>(system, 0.2), 2e-9);
+  EXPECT_LT(symplectic_defect<hamotor::Splitting8<System>>(system, 0.2), 2e-9);
+}
+
+TEST(Splitting, is_symplectic) {
+  expect_symplectic_splittings(sample::free_se3());
+  expect_symplectic_splittings(sample::forced_so3());
+  expect_symplectic_splittings(sample::forced_se2());
 }
 
 TEST(Splitting2, keeps_casimirs_and_the_spatial_momentum_to_rounding) {

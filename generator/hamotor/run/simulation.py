@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,8 +28,6 @@ if TYPE_CHECKING:
 SCALARS = ("double", "float", "long_double")
 KERNELS = ("generated", "generic")
 REPRESENTATIONS = ("ga", "matrix")
-_MATRIX_METHODS = ("auto", "rkmk4", "rk4")
-_GENERIC_METHODS = ("auto", "rkmk4")
 
 _AUTO_METHOD = "splitting2"
 _AUTO_REASON = (
@@ -45,7 +43,8 @@ class Simulation:
 
     `source` gives the scene's C++ text for (kernels, scalar); `state` is the initial state, per
     body motor and momentum, in the scene's body frame.  Times are in seconds.  `methods`, if given,
-    are all that a scene may ask for.  `read` gives the scene that it was made from.
+    are the names and orders of all that the scene offers, and only the one that is used is
+    compiled.  `read` gives the scene that it was made from.
     """
 
     name: str
@@ -57,7 +56,7 @@ class Simulation:
     method: str
     every: int
     spec_hash: str
-    methods: tuple[str, ...] = ()
+    methods: Mapping[str, int] = field(default_factory=dict)
     read: Callable[[], Scene | GeneralScene] | None = None
     matrix_source: Callable[[str], str] | None = None
     """Gives the C++ text in the matrix representation, for a scalar."""
@@ -68,12 +67,13 @@ class Simulation:
         scalar: str = "double",
         kernels: str = "generated",
         representation: str = "ga",
+        method: str | None = None,
         progress: Progress | None = None,
     ) -> Compiled:
-        """The scene's shared library, compiled or found in the cache, and loaded.
+        """The scene's shared library with one method, compiled or found in the cache, and loaded.
 
-        Raises UsageError for an unknown scalar, kernels or representation, ToolError when
-        compilation fails.
+        `method` is all that the scene offers if not given.  Raises UsageError for an unknown
+        scalar, kernels, representation or method, ToolError when compilation fails.
         """
         for name, value, allowed in (
             ("scalar", scalar, SCALARS),
@@ -92,6 +92,9 @@ class Simulation:
             source = self.matrix_source(scalar)
         else:
             source = self.source(kernels, scalar)
+        if method is not None and self.methods:
+            check_method(method, self.offered(kernels, representation))
+            source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
         generate_s = time.perf_counter() - started
         shown = NoProgress() if progress is None else progress
         build = compile_scene(
@@ -100,6 +103,14 @@ class Simulation:
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
         return Compiled(build, SceneLibrary(build.library), generate_s)
+
+    def offered(self, kernels: str, representation: str) -> Mapping[str, int]:
+        """Names and orders of the methods for a form of the scene; none where `methods` is."""
+        from hamotor.scene import Form, methods_offered
+
+        if not self.methods or (kernels, representation) == ("generated", "ga"):
+            return self.methods
+        return methods_offered(Form.MATRIX if representation == "matrix" else Form.GENERAL)
 
     def run(
         self,
@@ -141,29 +152,30 @@ class Simulation:
             raise UsageError("give a step or a tolerance, not both.")
         if csv and out is None:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
-        if representation == "matrix" and kernels != "generated":
-            raise UsageError("the matrix form has no kernels; leave out one of the two options.")
-        methods = self.methods
-        if representation == "matrix":
-            methods = _MATRIX_METHODS
-        elif kernels == "generic" and methods:
-            methods = _GENERIC_METHODS
-        chosen = method or self.method
-        if method is None and chosen not in methods and chosen in self.methods:
-            chosen = "auto"  # what the scene asks for is of its specialised form only
-        if methods:
-            # Before the compiler runs: a slip of the pen should not take seconds to come back.
-            check_method(chosen, dict.fromkeys(methods, 0))
-        folder = None if out is None else RunFolder(out)
-        shown = _progress(progress)
-        compiled = self.compile(
-            scalar=scalar, kernels=kernels, representation=representation, progress=shown
-        )
-        description = compiled.library.description
         end = self.end if end is None else end
         if step is None and tolerance is None:
             step, tolerance = self.step, self.tolerance
-        method, reason = choose_method(chosen, description.methods, tolerance)
+        methods = self.offered(kernels, representation)
+        chosen = method or self.method
+        if method is None and chosen not in methods and chosen in self.methods:
+            chosen = "auto"  # what the scene asks for is of its specialised form only
+        reason = ""
+        if methods:
+            # Before the compiler runs: a slip of the pen should not take seconds to come back.
+            chosen, reason = choose_method(chosen, methods, tolerance)
+        folder = None if out is None else RunFolder(out)
+        shown = _progress(progress)
+        compiled = self.compile(
+            scalar=scalar,
+            kernels=kernels,
+            representation=representation,
+            method=chosen,
+            progress=shown,
+        )
+        description = compiled.library.description
+        method = chosen
+        if not methods:
+            method, reason = choose_method(chosen, description.methods, tolerance)
 
         def new_recorder() -> Recorder:
             if folder is None:
@@ -277,7 +289,15 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
     Raises UsageError for an unknown name or a mistake in the file, naming file and key.
     """
-    from hamotor.scene import METHODS, find_scene, folder_of, parse_scene, scene_source
+    from hamotor.scene import (
+        Form,
+        Scene,
+        find_scene,
+        folder_of,
+        methods_offered,
+        parse_scene,
+        scene_source,
+    )
 
     contents, name, file = find_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
     kept = Remembered(default_cache(), key_of(contents, name, folder_of(scene)))
@@ -297,6 +317,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "method": found.time.method,
             "every": found.output.every,
             "spec_hash": found.sha256,
+            "methods": methods_offered(Form.SPLIT if isinstance(found, Scene) else Form.GENERAL),
         }
 
     def source(*choice: str) -> str:
@@ -312,7 +333,6 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
     return Simulation(
         **{**known, "state": np.array(known["state"])},
         source=source,
-        methods=METHODS,
         read=read,
         matrix_source=in_matrices,
     )

@@ -4,17 +4,20 @@ from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import GROUPS, Group
 from hamotor.scene.interactions import Gravity, Interaction, Spring
+from hamotor.scene.methods import METHOD_NAMES, METHODS, Form, methods_offered
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.principal import PrincipalFrame
 from hamotor.scene.reading import bundled_scenes, find_scene, folder_of, parse_scene, read_scene
-from hamotor.scene.schema import METHODS, scene_reference, starter_scene
+from hamotor.scene.schema import scene_reference, starter_scene
 from hamotor.scene.source import scene_source
 
 __all__ = [
     "GROUPS",
     "METHODS",
+    "METHOD_NAMES",
     "Body",
     "ConservedQuantity",
+    "Form",
     "GeneralScene",
     "Gravity",
     "Group",
@@ -27,6 +30,7 @@ __all__ = [
     "bundled_scenes",
     "find_scene",
     "folder_of",
+    "methods_offered",
     "parse_scene",
     "read_scene",
     "scene_reference",

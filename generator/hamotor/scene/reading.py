@@ -20,6 +20,7 @@ from hamotor.scene import inertia, schema
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
+from hamotor.scene.methods import METHOD_NAMES
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
     Matrix,
@@ -521,5 +522,5 @@ def _time(table: Table) -> Time:
         end=end,
         step=step,
         tolerance=tolerance,
-        method=table.choice("method", schema.METHODS, "methods"),
+        method=table.choice("method", METHOD_NAMES, "methods"),
     )

@@ -10,8 +10,8 @@ import textwrap
 from dataclasses import dataclass
 
 from hamotor.scene.groups import Group
+from hamotor.scene.methods import METHOD_NAMES
 
-METHODS = ("auto", "rkmk4", "splitting2")
 NAME_PATTERN = r"[A-Za-z][A-Za-z0-9_]*"
 MOST_BODIES = 64
 MOST_INTERACTIONS = 128
@@ -467,7 +467,7 @@ TIME = Section(
             example="1e-10",
             active=False,
         ),
-        Key("method", "one of", ", ".join(METHODS), default='"auto"'),
+        Key("method", "one of", ", ".join(METHOD_NAMES), default='"auto"'),
     ),
 )
 

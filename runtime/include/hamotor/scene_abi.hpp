@@ -279,12 +279,24 @@ template <class Scene>
   return list.text();
 }
 
+/// The one method that a library is compiled with, a define before this header; all if there is
+/// none.
+#ifndef HAMOTOR_METHOD
+#define HAMOTOR_METHOD ""
+#endif
+inline constexpr std::string_view compiled_method = HAMOTOR_METHOD;
+
+template <class Method>
+inline constexpr bool is_compiled = compiled_method.empty() || compiled_method == Method::name;
+
 template <class Methods>
 struct MethodTable;
 
 /// The methods a scene can be run with: their names, and one run of whichever is chosen.
 template <class... Method>
 struct MethodTable<std::tuple<Method...>> {
+  static_assert((is_compiled<Method> || ...), "HAMOTOR_METHOD names no method of this scene");
+
   [[nodiscard]] static std::string json() {
     JsonList list;
     (list.add("{\"name\": " + json_string(Method::name) +
@@ -292,11 +304,28 @@ struct MethodTable<std::tuple<Method...>> {
      ...);
     return list.text();
   }
-  using AnyOf = std::variant<Method...>;
 
-  /// Sets `method` to the one called `name`; false if there is none.
+  template <class... Compiled>
+  static std::variant<Compiled...> variant_of(const std::tuple<std::type_identity<Compiled>...>&);
+  using AnyOf = decltype(variant_of(
+      std::tuple_cat(std::conditional_t<is_compiled<Method>, std::tuple<std::type_identity<Method>>,
+                                        std::tuple<>>{}...)));
+
+  /// Sets `method` to the one called `name`; false if the library is compiled without it.
   [[nodiscard]] static bool choose(std::string_view name, AnyOf& method) {
-    return ((Method::name == name ? (method.template emplace<Method>(), true) : false) || ...);
+    return (choose_one<Method>(name, method) || ...);
+  }
+
+ private:
+  template <class One>
+  [[nodiscard]] static bool choose_one(std::string_view name, AnyOf& method) {
+    if constexpr (is_compiled<One>) {
+      if (name == One::name) {
+        method.template emplace<One>();
+        return true;
+      }
+    }
+    return false;
   }
 };
 
@@ -526,7 +555,7 @@ struct RunType<Scene> {
 template <class Scene>
 using RunOf = typename RunType<Scene>::type;
 
-/// `hamotor_start`: NULL for an unknown method, or without memory.
+/// `hamotor_start`: NULL for a method that is unknown or not compiled, or without memory.
 template <class Scene>
 [[nodiscard]] void* start(const char* method, double time, double step,
                           const double* state) noexcept {

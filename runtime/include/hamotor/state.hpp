@@ -156,6 +156,13 @@ concept SplitSystem =
       { system.free_change(state.motors, state.momenta, h) } -> std::same_as<ChangeOf<System>>;
     };
 
+/// Whether a system says that its free motion is exact, not only symmetric and of order 2.
+template <class System>
+inline constexpr bool freely_exact = false;
+template <class System>
+  requires requires { System::free_motion_is_exact; }
+inline constexpr bool freely_exact<System> = System::free_motion_is_exact;
+
 /// How far steps left the group: |M M~ − 1|, largest absolute coefficient over all bodies, before
 /// the motor was put back.
 template <class S>

@@ -9,8 +9,10 @@
 #include <cstddef>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 
 #include "hamotor/scalar.hpp"
+#include "hamotor/splitting_schemes.hpp"
 #include "hamotor/state.hpp"
 
 namespace hamotor {
@@ -56,6 +58,46 @@ template <class Rate, class S>
 [[nodiscard]] constexpr Rate dexp_inverse(const Rate& x, const Rate& b, const S& half) noexcept {
   const Rate once = ad(x, b);
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
+}
+
+/// The scheme of a splitting; a free motion that is exact needs none where nothing acts.
+template <class System, int order>
+[[nodiscard]] constexpr auto scheme_of() noexcept {
+  static_assert(order == 2 || order == 4 || order == 6 || order == 8 || order == 10);
+  if constexpr (order == 2 || (freely_exact<System> && !System::has_forque)) {
+    return Composition<Strang>{};
+  } else if constexpr (order == 4) {
+    return std::conditional_t<freely_exact<System>, BlanesMoan4, Composition<Suzuki4>>{};
+  } else if constexpr (order == 6) {
+    return std::conditional_t<freely_exact<System>, BlanesMoan6, Composition<KahanLi6>>{};
+  } else if constexpr (order == 8) {
+    return Composition<KahanLi8>{};
+  } else {
+    return Composition<SofroniouSpaletta10>{};
+  }
+}
+
+template <class System, int order>
+using SchemeOf = decltype(scheme_of<System, order>());
+
+[[nodiscard]] constexpr std::string_view splitting_name(int order) noexcept {
+  constexpr std::array<std::string_view, 5> names{"splitting2", "splitting4", "splitting6",
+                                                  "splitting8", "splitting10"};
+  return names[static_cast<std::size_t>(order / 2 - 1)];
+}
+
+/// A scheme's coefficients, rounded to S once.
+template <class S, class Scheme>
+[[nodiscard]] constexpr SplittingWeights<S, Scheme::stages> rounded_weights() noexcept {
+  const auto exact = Scheme::template weights<CoefficientScalar<S>>();
+  SplittingWeights<S, Scheme::stages> weights{};
+  for (std::size_t k = 0; k < Scheme::stages; ++k) {
+    weights.drifts[k] = static_cast<S>(exact.drifts[k]);
+  }
+  for (std::size_t k = 0; k <= Scheme::stages; ++k) {
+    weights.kicks[k] = static_cast<S>(exact.kicks[k]);
+  }
+  return weights;
 }
 
 }  // namespace detail
@@ -156,49 +198,57 @@ class Rkmk4 {
   S work_{};
 };
 
-/// Strang splitting, order 2, symmetric and symplectic: half a kick, the free motion, half a kick,
-/// where the free motion is itself exact or a symmetric composition of exact flows.
+/// Symmetric, symplectic splitting of order 2, 4, 6, 8 or 10: kicks and free motions in turn, where
+/// a free motion is exact or itself a symmetric composition of exact flows.
 ///
-/// Every part is a coadjoint motion or a kick: Casimirs of free bodies and the spatial momentum are
-/// constant but for rounding, whatever the step, and the energy error is bounded.  With compensated
-/// sums a rounding error is relative to the change in a step instead of to the state.  The forque
-/// at the end of a step is kept for the start of the next: one evaluation a step.
-template <SplitSystem System, Summation summation = Summation::compensated>
-class Splitting2 {
+/// Order 2 is Strang's.  Where the free motion is exact, orders 4 and 6 are Runge–Kutta–Nyström
+/// splittings; everything else is a composition of Strang's map.  Every part is a coadjoint motion
+/// or a kick: Casimirs of free bodies and the spatial momentum are constant but for rounding,
+/// whatever the step, and the energy error is bounded.  With compensated sums a rounding error is
+/// relative to the change in a part of a step instead of to the state.  A forque at the end of a
+/// step is kept for the start of the next.
+template <SplitSystem System, int nominal_order, Summation summation = Summation::compensated>
+class Splitting {
   using S = typename System::Scalar;
   using G = typename System::Group;
   using Motors = decltype(StateOf<System>::motors);
   using Momenta = decltype(StateOf<System>::momenta);
+  using Scheme = detail::SchemeOf<System, nominal_order>;
   static constexpr std::size_t n = System::bodies;
 
  public:
-  static constexpr int order = 2;
-  static constexpr std::string_view name = "splitting2";
+  static constexpr int order = nominal_order;
+  static constexpr std::string_view name = detail::splitting_name(nominal_order);
+  /// Free motions in a step.
+  static constexpr std::size_t stages = Scheme::stages;
 
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& /*t*/,
                          const S& h) noexcept {
-    if constexpr (System::has_forque) {
-      if (!(known_.at == state.motors && known_.any)) know_forque(system, state.motors);
-      const S half = S(-0.5) * h;
-      Momenta kicked{};
-      for (std::size_t i = 0; i < n; ++i) {
-        kicked[i] = mul_add(half, known_.forque[i], state.momenta[i]);
+    for (std::size_t k = 0; k < stages; ++k) {
+      const S drift = weights.drifts[k] * h;
+      const bool last = k + 1 == stages;
+      if constexpr (System::has_forque) {
+        const S before = k == 0 ? -weights.kicks[0] * h : S(0);
+        const S after = -weights.kicks[k + 1] * h;
+        Momenta kicked = state.momenta;
+        if (opens_with_kick && k == 0) {
+          if (!(known_.at == state.motors && known_.any)) know_forque(system, state.motors);
+          kick(kicked, before);
+        }
+        auto change = system.free_change(state.motors, kicked, drift);
+        if (opens_with_kick && k == 0) kick(change.momenta, before);
+        move(state.motors, change.motors, last);
+        if (opens_with_kick || !last) {
+          know_forque(system, state.motors);
+          kick(change.momenta, after);
+        }
+        push(state.momenta, change.momenta);
+      } else {
+        const auto change = system.free_change(state.motors, state.momenta, drift);
+        move(state.motors, change.motors, last);
+        push(state.momenta, change.momenta);
       }
-      auto change = system.free_change(state.motors, kicked, h);
-      for (std::size_t i = 0; i < n; ++i) {
-        change.momenta[i] = mul_add(half, known_.forque[i], change.momenta[i]);
-      }
-      move(state.motors, change.motors);
-      know_forque(system, state.motors);
-      for (std::size_t i = 0; i < n; ++i) {
-        change.momenta[i] = mul_add(half, known_.forque[i], change.momenta[i]);
-      }
-      push(state.momenta, change.momenta);
-    } else {
-      const auto change = system.free_change(state.motors, state.momenta, h);
-      move(state.motors, change.motors);
-      push(state.momenta, change.momenta);
     }
   }
 
@@ -217,6 +267,14 @@ class Splitting2 {
     Momenta momenta{};
   };
   static constexpr bool compensated = summation == Summation::compensated;
+  static constexpr auto weights = detail::rounded_weights<S, Scheme>();
+  static constexpr bool opens_with_kick = weights.kicks[0] > S(0);
+
+  constexpr void kick(Momenta& momenta, const S& by) const noexcept {
+    for (std::size_t i = 0; i < n; ++i) {
+      momenta[i] = mul_add(by, known_.forque[i], momenta[i]);
+    }
+  }
 
   constexpr void know_forque(const System& system, const Motors& motors) noexcept {
     known_.any = true;
@@ -224,7 +282,8 @@ class Splitting2 {
     known_.forque = system.forque(motors);
   }
 
-  constexpr void move(Motors& motors, const Motors& change) noexcept {
+  /// Adds what the motors change by; at the end of a step they are put back on the group.
+  constexpr void move(Motors& motors, const Motors& change, bool last) noexcept {
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = motors[i];
@@ -232,16 +291,18 @@ class Splitting2 {
       if constexpr (compensated) {
         auto& low = low_.motors[i];
         detail::add_compensated(motor, low, change[i]);
+        if (!last) continue;
         defect = unit_defect(motor) + unit_defect_change(motor, low);
         detail::add_compensated(motor, low, unit_correction(motor, defect));
       } else {
         motor = motor + change[i];
+        if (!last) continue;
         defect = unit_defect(motor);
         motor = motor + unit_correction(motor, defect);
       }
       worst = scalar::max_abs(worst, detail::size(defect));
     }
-    detail::record(drift_, worst);
+    if (last) detail::record(drift_, worst);
   }
 
   constexpr void push(Momenta& momenta, const Momenta& change) noexcept {
@@ -259,6 +320,17 @@ class Splitting2 {
   Drift<S> drift_;
 };
 
+template <SplitSystem System, Summation summation = Summation::compensated>
+using Splitting2 = Splitting<System, 2, summation>;
+template <SplitSystem System, Summation summation = Summation::compensated>
+using Splitting4 = Splitting<System, 4, summation>;
+template <SplitSystem System, Summation summation = Summation::compensated>
+using Splitting6 = Splitting<System, 6, summation>;
+template <SplitSystem System, Summation summation = Summation::compensated>
+using Splitting8 = Splitting<System, 8, summation>;
+template <SplitSystem System, Summation summation = Summation::compensated>
+using Splitting10 = Splitting<System, 10, summation>;
+
 namespace detail {
 
 template <class System>
@@ -267,7 +339,8 @@ struct Steppers {
 };
 template <SplitSystem System>
 struct Steppers<System> {
-  using type = std::tuple<Rkmk4<System>, Splitting2<System>>;
+  using type = std::tuple<Rkmk4<System>, Splitting2<System>, Splitting4<System>, Splitting6<System>,
+                          Splitting8<System>, Splitting10<System>>;
 };
 
 }  // namespace detail

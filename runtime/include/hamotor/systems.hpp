@@ -165,6 +165,7 @@ template <class S, std::size_t R, RotationSplit split>
 class PrincipalRotation {
  public:
   using Angular = std::array<S, R>;
+  static constexpr bool is_exact = R == 1 || split.axes < 2;
 
   /// What a free rotation does: M ↦ M q, and what it adds to Π.
   struct Change {
@@ -266,6 +267,7 @@ class FreeBody {
   using Point = typename Space<G>::template Point<S>;
   using Direction = typename Space<G>::template Direction<S>;
   static constexpr std::size_t rotations = Space<G>::rotations;
+  static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr std::size_t dimension = Space<G>::dimension;
   static_assert(Space<G>::translates, "a body of a group of rotations is a PivotedBody");
 
@@ -359,6 +361,7 @@ class PivotedBody {
   using Point = typename Space<G>::template Point<S>;
   using Direction = typename Space<G>::template Direction<S>;
   static constexpr std::size_t rotations = Space<G>::rotations;
+  static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr std::size_t dimension = Space<G>::dimension;
   static_assert(!Space<G>::translates, "a body of a group that translates is a FreeBody");
 
@@ -575,6 +578,7 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   using Scalar = typename FirstBody::Scalar;
   static constexpr std::size_t bodies = sizeof...(Body);
   static constexpr bool has_forque = sizeof...(Interaction) > 0;
+  static constexpr bool free_motion_is_exact = (Body::free_motion_is_exact && ...);
   using Motors = std::array<typename Group::template Element<Scalar>, bodies>;
   using Momenta = std::array<typename Group::template Momentum<Scalar>, bodies>;
   using Rates = std::array<typename Group::template Rate<Scalar>, bodies>;

@@ -1,0 +1,50 @@
+"""The methods a scene can be run with: names, orders and what each is for.  The only list of them.
+
+The runtime's steppers say the same names and orders; tests compare.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Flag, auto
+
+
+class Form(Flag):
+    """How a scene is given to its stepper."""
+
+    SPLIT = auto()
+    """Rigid bodies: kinetic energy, whose motion is known, and a potential."""
+    GENERAL = auto()
+    """Any H: its whole gradient."""
+    MATRIX = auto()
+    """Matrices in place of motors."""
+
+
+@dataclass(frozen=True)
+class Method:
+    """A one-step method, and the forms of a scene that it steps."""
+
+    name: str
+    order: int
+    description: str
+    forms: Form
+
+
+ANY = Form.SPLIT | Form.GENERAL
+AUTO = "auto"
+METHODS = (
+    Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
+    Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
+    Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),
+    Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT),
+    Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT),
+    Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT),
+    Method("rk4", 4, "classical Runge-Kutta, with --representation matrix only", Form.MATRIX),
+)
+METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
+"""What a scene may ask for."""
+
+
+def methods_offered(form: Form) -> dict[str, int]:
+    """Names and orders of the methods for this form of a scene."""
+    return {method.name: method.order for method in METHODS if method.forms & form}
