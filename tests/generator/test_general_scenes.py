@@ -523,6 +523,108 @@ step = 0.001
     assert np.abs(run.position()[-1] - 2 * wide(list(speeds.values()))).max() <= 1e-10
 
 
+def test_a_body_in_an_ideal_fluid_of_other_numbers(tmp_path: Path) -> None:
+    """Kirchhoff: Π̇ = Π×Ω + P×V + τ, Ṗ = P×Ω, with (Ω, V) = K⁻¹ (Π, P) and K full."""
+    drawn = Drawn("fluid")
+    root = [[drawn.number(-1, 1) for _ in range(6)] for _ in range(6)]
+    matrix = np.array(root) @ np.transpose(root) + 2 * np.eye(6)
+    matrix = np.round((matrix + matrix.T) / 2, 3)
+    depth, weight = drawn.number(0.1, 0.5), drawn.number(2, 6)
+    text = drawn.text(
+        f"""
+[[interaction]]
+type = "potential"
+expression = "weight*direction(0, 0, -depth).z"
+parameters = {{ weight = {weight}, depth = {depth} }}
+""",
+        mass=f"kinetic_matrix = {matrix.tolist()}",
+    )
+    inverse = np.linalg.inv(matrix).astype(np.longdouble)
+    for _ in range(3):  # Newton's iteration for the digits that a double lacks
+        inverse = inverse @ (2 * np.eye(6) - wide(matrix) @ inverse)
+
+    def field(y: Wide) -> Wide:
+        r, angular, linear = y[3:12].reshape(3, 3), y[12:15], y[15:]
+        rates = inverse @ y[12:]
+        w, v = rates[:3], rates[3:]
+        couple = np.cross(wide([0, 0, -depth]), r.T @ wide([0, 0, -weight]))
+        turning = np.cross(angular, w) + np.cross(linear, v) + couple
+        return np.concatenate([r @ v, (r @ hat(w)).ravel(), turning, np.cross(linear, w)])
+
+    start = wide(matrix) @ wide([*drawn.turning, *drawn.velocity])
+    rotation = turned(drawn.quaternion)
+    y = extrapolated(
+        field, np.concatenate([wide(drawn.position), rotation.ravel(), start]), 1.0, 40
+    )
+    run = load(text, tmp_path).run(step=1 / 4000)
+    expect(run, y[:3], y[3:12].reshape(3, 3))
+    assert np.abs(run.momentum()[-1] - y[12:]).max() <= 1e-10
+
+
+def conformal_generators() -> list[Wide]:
+    """What each generator of SO(4,1) does to e0, e1, e2, e3, e∞: columns are the images."""
+    matrices = []
+    for i, j in ((1, 2), (2, 0), (0, 1)):  # x ↦ ω×x
+        matrix = np.zeros((5, 5), np.longdouble)
+        matrix[1 + j, 1 + i], matrix[1 + i, 1 + j] = 1, -1
+        matrices.append(matrix)
+    for i in (1, 2, 3):  # e0 ↦ e_i, e_i ↦ e∞: translations
+        matrix = np.zeros((5, 5), np.longdouble)
+        matrix[i, 0] = matrix[4, i] = 1
+        matrices.append(matrix)
+    matrices.append(np.diag(wide([-1, 0, 0, 0, 1])))  # dilation
+    for i in (1, 2, 3):  # e_i ↦ −e0, e∞ ↦ −e_i: special conformal motions
+        matrix = np.zeros((5, 5), np.longdouble)
+        matrix[0, i] = matrix[i, 4] = -1
+        matrices.append(matrix)
+    return matrices
+
+
+def test_a_quadratic_hamiltonian_on_all_conformal_maps(tmp_path: Path) -> None:
+    """L̇ = L A(B) and μ̇_i = c_jiᵏ B_j μ_k with 5 × 5 matrices; [A_i, A_j] = c_ijᵏ A_k."""
+    drawn = random.Random("conformal")
+    names = ["e23", "e31", "e12", "e1i", "e2i", "e3i", "e0i", "e01", "e02", "e03"]
+    inertia = [round(drawn.uniform(1, 4), 3) for _ in names]
+    momentum = [round(drawn.uniform(-1, 1), 3) for _ in names]
+    terms = " + ".join(
+        f"momentum(top).{name}^2/{2 * x!r}" for name, x in zip(names, inertia, strict=True)
+    )
+    shown = ", ".join(f"{name} = {x}" for name, x in zip(names, momentum, strict=True))
+    text = f"""
+algebra = "cga3"
+group = "SO41"
+[[body]]
+name = "top"
+momentum = {{ {shown} }}
+[hamiltonian]
+expression = "{terms}"
+[time]
+end = 2.0
+step = 0.001
+"""
+    generators = conformal_generators()
+    columns = np.stack([g.ravel() for g in generators], -1).astype(np.float64)
+    structure = np.zeros((10, 10, 10), np.longdouble)
+    for i, a in enumerate(generators):
+        for j, b in enumerate(generators):
+            bracket = (a @ b - b @ a).ravel().astype(np.float64)
+            found = np.linalg.lstsq(columns, bracket, rcond=None)[0]
+            assert np.abs(columns @ found - bracket).max() < 1e-12
+            structure[i, j] = np.round(found)
+
+    def field(y: Wide) -> Wide:
+        matrix, mu = y[:25].reshape(5, 5), y[25:]
+        rates = mu / wide(inertia)
+        rate = sum(b * g for b, g in zip(rates, generators, strict=True))
+        return np.concatenate([(matrix @ rate).ravel(), np.einsum("jik,j,k", structure, rates, mu)])
+
+    y = extrapolated(field, np.concatenate([np.eye(5).ravel(), wide(momentum)]), 2.0, 40)
+    run = load(text, tmp_path).run(step=1 / 2000)
+    assert np.abs(run.momentum()[-1] - y[25:]).max() <= 1e-10
+    origin = y[:25].reshape(5, 5)[:, 0]
+    assert np.abs(run.position()[-1] - origin[1:4] / origin[0]).max() <= 1e-10
+
+
 # ------------------------------------------------------------------------ bundled scenes
 
 

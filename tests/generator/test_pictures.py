@@ -136,3 +136,45 @@ def test_pictures_are_written_as_png_beside_the_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize("rows", [2, 3, 50])
 def test_few_rows_can_be_drawn(tmp_path: Path, rows: int) -> None:
     toy().run(end=float(rows - 1), step=1.0).plot(tmp_path)
+
+
+def four_dimensional(t: Array) -> dict[str, Array]:
+    """Turning in the planes 12 and 34 at once, while the origin goes round in four dimensions."""
+    c, s = np.cos(t / 2), np.sin(t / 2)
+    motor = {"s": c * c, "e12": -s * c, "e34": -s * c, "e1234": s * s, "e04": 0 * t}
+    place = np.stack([np.cos(t), np.sin(t), 0.1 * t, np.cos(2 * t)], -1)
+    return {f"top.motor.{blade}": x for blade, x in motor.items()} | {
+        f"top.position.{axis}": place[:, k] for k, axis in enumerate("xyzw")
+    }
+
+
+def test_four_dimensions_are_seen_along_the_fourth() -> None:
+    table = {"t": T, **four_dimensional(T)}
+    figure = draw_path(account(table), table)
+    assert titles(figure) == ["path of the body frame's origin", "attitude of top"]
+    assert "seen along the fourth axis" in figure.axes[0].get_title()
+    entries = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "body axis 4" in entries
+    over_time = [axes for axes in figure.axes if not axes.get_title()]
+    assert [len(axes.lines) for axes in over_time] == [4, 4]
+    for line in over_time[1].lines:
+        np.testing.assert_allclose(np.asarray(line.get_ydata()), np.cos(T), atol=1e-12)
+
+
+def test_a_body_that_scales_has_its_size_over_time() -> None:
+    table = {"t": T, **spinning("top", T, CIRCLE), "top.scale": 1 + 0.1 * np.sin(T)}
+    figure = draw_path(account(table), table)
+    assert titles(figure)[-1] == "size"
+    (line,) = figure.axes[-1].lines
+    np.testing.assert_array_equal(np.asarray(line.get_ydata()), table["top.scale"])
+    assert figure.axes[-1].get_yscale() == "linear"
+    table["top.scale"] = np.exp(T)
+    assert draw_path(account(table), table).axes[-1].get_yscale() == "log"
+
+
+def test_a_group_that_bends_lines_shows_its_motor_instead_of_an_attitude() -> None:
+    table = {"t": T, **spinning("top", T, CIRCLE), "top.motor.e01": 0 * T}
+    figure = draw_path(account(table) | {"algebra": "cga3"}, table)
+    assert titles(figure) == ["path of the body frame's origin", "motor of top"]
+    assert "axes" not in figure.axes[0].get_title()
+    assert len(figure.axes[-1].lines) == 5

@@ -16,7 +16,7 @@ from tests.generator.toy import RATE, toy
 
 import hamotor
 from hamotor.errors import UsageError
-from hamotor.run.attitude import angle_between, rotation_matrices
+from hamotor.run.attitude import angle_between, has_attitude, rotation_matrices
 from hamotor.run.report import summary, to_json
 
 
@@ -160,3 +160,31 @@ def test_importing_hamotor_does_not_wait_for_numpy() -> None:
     )
     with pytest.raises(AttributeError, match="no attribute 'lod'"):
         hamotor.lod  # noqa: B018
+
+
+def test_a_rotor_of_four_dimensions_turns_two_planes_at_once() -> None:
+    a, b = 0.4, -1.1
+    ca, sa, cb, sb = math.cos(a / 2), math.sin(a / 2), math.cos(b / 2), math.sin(b / 2)
+    motor = {"s": ca * cb, "e12": -sa * cb, "e34": -ca * sb, "e1234": sa * sb, "e01": 0.3}
+    found = rotation_matrices({blade: np.array([x]) for blade, x in motor.items()})[0]
+    expected = np.zeros((4, 4))
+    for at, angle in ((0, a), (2, b)):
+        c, s = math.cos(angle), math.sin(angle)
+        expected[at : at + 2, at : at + 2] = [[c, -s], [s, c]]
+    np.testing.assert_allclose(found, expected, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("algebra", "blades", "turns"),
+    [
+        ("pga3", ["s", "e23", "e01"], True),
+        ("pga3", ["s", "e01", "e02", "e03"], True),
+        ("cga3", ["s", "e23", "e1i", "e0i"], True),
+        ("cga3", ["s", "e23", "e1i", "e0i", "e01"], False),
+        ("sta", ["s", "e23", "e01"], False),
+    ],
+)
+def test_motors_that_bend_lines_have_no_attitude(
+    algebra: str, blades: list[str], turns: bool
+) -> None:
+    assert has_attitude(algebra, blades) is turns
