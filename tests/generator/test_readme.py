@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+import hamotor
+
 ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 NUMBER = re.compile(r"-?\d[\d,]*\.?\d*(?:e[+-]?\d+)?")
@@ -63,6 +65,17 @@ def test_readme_python_runs(tmp_path: Path) -> None:
     assert blocks("python")
     for block in blocks("python"):
         subprocess.run([sys.executable, "-c", block], cwd=tmp_path, env=environment(), check=True)
+
+
+def test_readme_scenes_run_and_conserve_their_energy(tmp_path: Path) -> None:
+    scenes = blocks("toml")
+    assert len(scenes) >= 2
+    for number, text in enumerate(scenes):
+        path = tmp_path / f"scene{number}.toml"
+        path.write_text(text, encoding="utf-8")
+        conserved = hamotor.load(path).run().report["conserved"]
+        (energy,) = (x for name, x in conserved.items() if name.startswith("energy"))
+        assert energy["max_relative_error"] < 1e-8
 
 
 def test_readme_application_is_the_consumer_that_packaging_builds() -> None:
