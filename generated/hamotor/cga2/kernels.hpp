@@ -723,7 +723,7 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 26 mul, 16 add (12 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 27 mul, 17 add (12 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(
@@ -731,7 +731,8 @@ template <class S>
       dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
           (S(1) - m.s));
   const S radius = scalar::sqrt(dot(m.e012i, m.e012i, shifted, shifted));
-  const S root = scalar::sqrt(shifted + radius);
+  const S root = scalar::sqrt(
+      select(shifted > S(0), shifted + radius, m.e012i * m.e012i / (radius - shifted)));
   const S factor = S(0.5) * (root / radius);
   const S turn = S(0.5) * -m.e012i / radius / root;
   return {.s = dot(factor, shifted, turn, -m.e012i),
@@ -747,13 +748,14 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 19 mul, 12 add (9 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 20 mul, 13 add (9 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i) / (S(1) - m.s));
   const S radius = scalar::sqrt(dot(m.e012i, m.e012i, shifted, shifted));
-  const S root = scalar::sqrt(shifted + radius);
+  const S root = scalar::sqrt(
+      select(shifted > S(0), shifted + radius, m.e012i * m.e012i / (radius - shifted)));
   const S factor = S(0.5) * (root / radius);
   const S turn = S(0.5) * -m.e012i / radius / root;
   return {.s = dot(factor, shifted, turn, -m.e012i),

@@ -2132,7 +2132,7 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 68 mul, 44 add (39 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 71 mul, 47 add (41 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2141,7 +2141,9 @@ template <class S>
                                (S(1) - m.s));
   const S radius = scalar::sqrt(
       mul_add(shifted, shifted, -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i)));
-  const S root = scalar::sqrt(shifted + radius);
+  const S root = scalar::sqrt(
+      select(shifted > S(0), shifted + radius,
+             -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) / (radius - shifted)));
   const S factor = S(0.5) * (root / radius);
   const S slip = S(-0.5) / radius / root;
   return {
@@ -2165,7 +2167,7 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 111 mul, 76 add (64 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 116 mul, 80 add (66 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2176,7 +2178,10 @@ template <class S>
   const S radius = scalar::sqrt(mul_add(
       shifted, shifted,
       -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i)));
-  const S root = scalar::sqrt(shifted + radius);
+  const S root = scalar::sqrt(select(
+      shifted > S(0), shifted + radius,
+      -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i) /
+          (radius - shifted)));
   const S factor = S(0.5) * (root / radius);
   const S slip = S(-0.5) / radius / root;
   return {

@@ -1038,17 +1038,30 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 82 mul, 50 add (42 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 83 mul, 58 add (40 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
-  const S shifted = select(m.s > S(0), S(1) + m.s,
-                           dot(m.e12, m.e12, m.e13, m.e13, m.e14, m.e14, m.e23, m.e23, m.e24, m.e24,
-                               m.e34, m.e34, m.e1234, m.e1234) /
-                               (S(1) - m.s));
-  const S radius = scalar::sqrt(mul_add(shifted, shifted, -(m.e1234 * m.e1234)));
-  const S root = scalar::sqrt(shifted + radius);
+  const S plus_0 = m.e12 - m.e34;
+  const S minus_0 = m.e12 + m.e34;
+  const S plus_1 = m.e13 + m.e24;
+  const S minus_1 = m.e13 - m.e24;
+  const S plus_2 = m.e14 - m.e23;
+  const S minus_2 = m.e14 + m.e23;
+  const S cosine_plus = m.s + m.e1234;
+  const S shifted_plus =
+      select(cosine_plus > S(0), S(1) + cosine_plus,
+             dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2) / (S(1) - cosine_plus));
+  const S cosine_minus = m.s - m.e1234;
+  const S shifted_minus =
+      select(cosine_minus > S(0), S(1) + cosine_minus,
+             dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2) / (S(1) - cosine_minus));
+  const S shifted = S(0.5) * (shifted_plus + shifted_minus);
+  const S root_plus = scalar::sqrt(S(2) * shifted_plus);
+  const S root_minus = scalar::sqrt(S(2) * shifted_minus);
+  const S radius = root_plus * root_minus;
+  const S root = root_plus + root_minus;
   const S factor = S(0.5) * (root / radius);
-  const S slip = S(-0.5) / radius / root;
+  const S slip = S(-2) / radius / root;
   return {
       .s = dot(factor, shifted, slip, m.e1234 * m.e1234),
       .e12 = dot(factor, m.e12, slip, -m.e1234 * m.e34),
@@ -1079,17 +1092,30 @@ template <class S>
 /// sqrt: Rotor -> Rotor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 27 mul, 18 add (14 fused), 4 div, 1 select, 2 sqrt.
+/// Cost: 28 mul, 26 add (12 fused), 5 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
-  const S shifted = select(r.s > S(0), S(1) + r.s,
-                           dot(r.e12, r.e12, r.e13, r.e13, r.e14, r.e14, r.e23, r.e23, r.e24, r.e24,
-                               r.e34, r.e34, r.e1234, r.e1234) /
-                               (S(1) - r.s));
-  const S radius = scalar::sqrt(mul_add(shifted, shifted, -(r.e1234 * r.e1234)));
-  const S root = scalar::sqrt(shifted + radius);
+  const S plus_0 = r.e12 - r.e34;
+  const S minus_0 = r.e12 + r.e34;
+  const S plus_1 = r.e13 + r.e24;
+  const S minus_1 = r.e13 - r.e24;
+  const S plus_2 = r.e14 - r.e23;
+  const S minus_2 = r.e14 + r.e23;
+  const S cosine_plus = r.s + r.e1234;
+  const S shifted_plus =
+      select(cosine_plus > S(0), S(1) + cosine_plus,
+             dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2) / (S(1) - cosine_plus));
+  const S cosine_minus = r.s - r.e1234;
+  const S shifted_minus =
+      select(cosine_minus > S(0), S(1) + cosine_minus,
+             dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2) / (S(1) - cosine_minus));
+  const S shifted = S(0.5) * (shifted_plus + shifted_minus);
+  const S root_plus = scalar::sqrt(S(2) * shifted_plus);
+  const S root_minus = scalar::sqrt(S(2) * shifted_minus);
+  const S radius = root_plus * root_minus;
+  const S root = root_plus + root_minus;
   const S factor = S(0.5) * (root / radius);
-  const S turn = S(0.5) * -r.e1234 / radius / root;
+  const S turn = S(2) * -r.e1234 / radius / root;
   return {.s = dot(factor, shifted, turn, r.e1234),
           .e12 = dot(factor, r.e12, turn, -r.e34),
           .e13 = dot(factor, r.e13, turn, r.e24),
@@ -1252,14 +1278,25 @@ template <class S>
 /// cayley_inverse: Motor -> Bivector
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 48 mul, 27 add (24 fused), 2 div, 1 select.
+/// Cost: 47 mul, 35 add (22 fused), 3 div, 2 select.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
-  const S shifted = select(m.s > S(0), S(1) + m.s,
-                           dot(m.e12, m.e12, m.e13, m.e13, m.e14, m.e14, m.e23, m.e23, m.e24, m.e24,
-                               m.e34, m.e34, m.e1234, m.e1234) /
-                               (S(1) - m.s));
-  const S inverse = S(1) / mul_add(shifted, shifted, -(m.e1234 * m.e1234));
+  const S plus_0 = m.e12 - m.e34;
+  const S minus_0 = m.e12 + m.e34;
+  const S plus_1 = m.e13 + m.e24;
+  const S minus_1 = m.e13 - m.e24;
+  const S plus_2 = m.e14 - m.e23;
+  const S minus_2 = m.e14 + m.e23;
+  const S cosine_plus = m.s + m.e1234;
+  const S shifted_plus =
+      select(cosine_plus > S(0), S(1) + cosine_plus,
+             dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2) / (S(1) - cosine_plus));
+  const S cosine_minus = m.s - m.e1234;
+  const S shifted_minus =
+      select(cosine_minus > S(0), S(1) + cosine_minus,
+             dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2) / (S(1) - cosine_minus));
+  const S shifted = S(0.5) * (shifted_plus + shifted_minus);
+  const S inverse = S(1) / (shifted_plus * shifted_minus);
   const S linear = shifted * inverse;
   return {.e12 = dot(linear, m.e12, inverse, m.e1234 * m.e34),
           .e13 = dot(linear, m.e13, inverse, -m.e1234 * m.e24),

@@ -32,6 +32,7 @@ from hamotor.codegen.program import (
     negative,
     number,
     polynomial_expression,
+    sum_of_products,
 )
 from hamotor.errors import UsageError
 
@@ -281,6 +282,83 @@ def cayley_kernel(
     return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace, None, notes)
 
 
+def _with_signs(
+    writer: Writer, prefix: str, number_part: Polynomial, quad_part: Polynomial
+) -> tuple[Expression, Expression] | None:
+    """S + q and S − q, for S = Σ ±(x² + y²) and q = Σ ±2 x y, as sums of ±(x ± y)².
+
+    So nothing cancels between S and q.  None where they are not of that kind.
+    """
+    if len(number_part) != 2 * len(quad_part):
+        return None
+    sums: tuple[list[tuple[Expression, ...]], list[tuple[Expression, ...]]] = ([], [])
+    for index, (monomial, twice) in enumerate(quad_part.items()):
+        x, *others = monomial
+        square = number_part.get((x, x), 0)
+        if len(others) != 1 or number_part.get((others[0],) * 2) != square:
+            return None
+        if abs(square) != 1 or abs(twice) != 2:
+            return None
+        for terms, sign, side in zip(sums, (1, -1), ("plus", "minus"), strict=True):
+            y: Expression = Name(others[0])
+            total = Sum(Name(x), y if sign * twice * square > 0 else negative(y))
+            name = writer.let(f"{prefix}{side}_{index}", total)
+            terms.append((name if square > 0 else negative(name), name))
+    plus, minus = (sum_of_products(terms) for terms in sums)
+    return plus, minus
+
+
+def _on_planes(
+    algebra: Algebra,
+    writer: Writer,
+    square: PolynomialMultivector,
+    quad: PolynomialMultivector,
+    prefix: str,
+) -> tuple[Expression, Expression] | None:
+    """What S + W, a square, is where J = 1 and where J = −1, without cancellation.
+
+    J: the only blade of grade 4 in `quad` whose square is not 0.  None unless that is 1.
+    """
+    squares = [(b, algebra.blade_product(b, b).get(0, 0)) for b in quad]
+    turning = [(b, x) for b, x in squares if x]
+    if len(turning) != 1 or turning[0][1] != 1:
+        return None
+    (blade, _), *_ = turning
+    return _with_signs(writer, prefix, square.get(0, {}), square.get(blade, {}))
+
+
+def _one_plus_eigenvalues(
+    algebra: Algebra, writer: Writer, value: PolynomialMultivector
+) -> tuple[Expression, Expression] | None:
+    """1 + s + q and 1 + s − q of M ~M = 1, s + q J + … its grades 0 and 4, J² = 1.
+
+    Where s ± q < 0 as (1 − (s ± q)²) / (1 − (s ± q)), with 1 − (s + q J)² = −<M>₂² in squares:
+    so nothing cancels where a pair of planes turns by half an angle of π.
+    None where no such J exists.
+    """
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
+    square = poly.apply_bilinear(algebra.geometric, bivector, bivector)
+    rest = _on_planes(
+        algebra,
+        writer,
+        {b: poly.scaled(p, -1) for b, p in square.items()},
+        {b: p for b, p in value.items() if grade(b) == 4},
+        "",
+    )
+    if rest is None:
+        return None
+    (blade,) = (b for b in value if grade(b) == 4 and algebra.blade_product(b, b))
+    s, q = (polynomial_expression(value[b]) for b in (0, blade))
+    found = []
+    for side, quad, far in zip(("plus", "minus"), (q, negative(q)), rest, strict=True):
+        cosine = writer.let(f"cosine_{side}", Sum(s, quad))
+        near = Sum(ONE, cosine)
+        beyond = Quotient(far, Sum(ONE, negative(cosine)))
+        found.append(writer.let(f"shifted_{side}", Select(cosine, near, beyond)))
+    plus, minus = found
+    return plus, minus
+
+
 def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
     value = value_of(parameter)
     if any(g % 2 for g in parameter.element.grades) or max(parameter.element.grades) > 4:
@@ -300,7 +378,8 @@ def cayley_inverse_kernel(
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most 5 dimensions")
-    rest = Name(_one_plus_scalar(algebra, writer, value))
+    planes = _one_plus_eigenvalues(algebra, writer, value)
+    rest = _mean(writer, planes) if planes else Name(_one_plus_scalar(algebra, writer, value))
     twisted = {
         b: poly.scaled(p, -1)
         for b, p in poly.apply_bilinear(algebra.geometric, bivector, quad).items()
@@ -308,7 +387,8 @@ def cayley_inverse_kernel(
     }
     if omega:
         square = negative(polynomial_expression(omega[0]))
-        inverse = writer.let("inverse", Quotient(ONE, MultiplyAdd(rest, rest, square)))
+        determinant = Product(*planes) if planes else MultiplyAdd(rest, rest, square)
+        inverse = writer.let("inverse", Quotient(ONE, determinant))
         linear = writer.let("linear", Product(rest, inverse))
     else:
         linear = writer.let("linear", Quotient(ONE, rest))
@@ -318,6 +398,13 @@ def cayley_inverse_kernel(
     law = "(M − 1)(M + 1)⁻¹, M ~M = 1"
     notes = ("Infinite at M = −1, which no finite bivector reaches.",)
     return Kernel("cayley_inverse", law, program, None, namespace, None, notes)
+
+
+def _mean(writer: Writer, planes: tuple[Expression, Expression]) -> Name:
+    """1 + s from what it is with q and with −q."""
+    mean = writer.let("shifted", Product(number(Fraction(1, 2)), Sum(*planes)))
+    assert isinstance(mean, Name)
+    return mean
 
 
 def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
@@ -438,14 +525,16 @@ def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str)
     (parameter,) = parameters_for(operand)
     writer = Writer()
     value = _versor(parameter, where)
-    shifted: Polynomial = {(_one_plus_scalar(algebra, writer, value),): 1}
     quad = {b: p for b, p in value.items() if grade(b) == 4}
+    planes = _one_plus_eigenvalues(algebra, writer, value)
+    rest = _mean(writer, planes).text if planes else _one_plus_scalar(algebra, writer, value)
+    shifted: Polynomial = {(rest,): 1}
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
     parts = Square(shifted, quad, 1, omega.get(0, {}))
     value[0] = shifted
-    out = _over_root(algebra, writer, value, parts, twice=True)
+    out = _over_root(algebra, writer, value, parts, planes, twice=True)
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
     return Kernel("sqrt", "√m: half the motion, √m √m = m", program, None, "", None, notes)
@@ -471,20 +560,37 @@ def _over_root(
     writer: Writer,
     value: PolynomialMultivector,
     parts: Square,
+    planes: tuple[Expression, Expression] | None = None,
     *,
     twice: bool = False,
 ) -> dict[Blade, Expression]:
-    """A (N + Q)^(−1/2) for a square N + Q that commutes with A; twice: A (2 N + 2 Q)^(−1/2)."""
+    """A (N + Q)^(−1/2) for a square N + Q that commutes with A; twice: A (2 N + 2 Q)^(−1/2).
+
+    planes: N + q and N − q, q² = Q², where they are known better than from N and q.
+    """
     half = number(Fraction(1, 2))
     norm = polynomial_expression(parts.number)
-    radius = norm
-    doubled: Expression = Product(number(2), norm)
-    if parts.omega:
-        omega = negative(polynomial_expression(parts.omega))
-        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
-        doubled = Sum(norm, radius)
-    square = doubled if twice else Product(half, doubled) if parts.omega else norm
-    root = writer.let("root", Call("sqrt", (square,)))
+    content = ratio(-parts.content, 2)
+    if planes and twice:
+        roots = [
+            writer.let(f"root_{side}", Call("sqrt", (Product(number(2), x),)))
+            for side, x in zip(("plus", "minus"), planes, strict=True)
+        ]
+        radius = writer.let("radius", Product(*roots))
+        root = writer.let("root", Sum(*roots))
+        content = 4 * content
+    else:
+        radius = norm
+        doubled: Expression = Product(number(2), norm)
+        if parts.omega:
+            omega = negative(polynomial_expression(parts.omega))
+            radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
+            doubled = Sum(norm, radius)
+            if twice and any(x < 0 for x in parts.omega.values()):
+                # boosts beside half an angle near π: N < 0, and nothing may cancel
+                doubled = Select(norm, doubled, Quotient(omega, Sum(radius, negative(norm))))
+        square = doubled if twice else Product(half, doubled) if parts.omega else norm
+        root = writer.let("root", Call("sqrt", (square,)))
     if not parts.quad:
         factor = writer.let("factor", Quotient(ONE, root))
         return _combination([(factor, value)], {})
@@ -498,7 +604,6 @@ def _over_root(
     share: Expression = Quotient(root, radius)
     factor = writer.let("factor", Product(half, share) if twice else share)
     turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
-    content = ratio(-parts.content, 2)
     quad = next(iter(parts.quad.values()))
     if len(parts.quad) == 1 and len(quad) == 1:
         # one grade-4 blade: take it into the factor, so that each component costs one fma

@@ -115,16 +115,18 @@ template <class S>
   const S smaller = larger > S(0) ? -(c * c * rho) / larger : S(0);
   const S boost_part = square < S(0) ? smaller : larger;
   const S turn_part = square < S(0) ? larger : smaller;
+  // Everything from these: of b itself near π the sine would have lost its digits.
   const S sinh_a = sqrt(boost_part - rho);
+  const S cosh_a = sqrt(S(1) + sinh_a * sinh_a);
+  const S turning = sqrt(turn_part);
   const S a = asinh(sinh_a);
-  const S b = atan2(sqrt(turn_part), c);
-  const S cot_a = detail::angle_cotangent(-a * a);
-  const S cot_b = detail::angle_cotangent(b * b);
-  const S sin_b = sqrt(turn_part) / sqrt(S(1) + sinh_a * sinh_a);
+  const S b = atan2(turning, c);
+  const S sin_b = turning / cosh_a;
+  const S cos_b = c / cosh_a;
+  const S cot_a = sinh_a > S(0) ? a * cosh_a / sinh_a : S(1);
+  const S cot_b = turning > S(0) ? b * c / turning : S(1);
   const S gap = -(sinh_a * sinh_a) - sin_b * sin_b;
   // (f₊ + f₋)/2 with a → i a
-  const S cosh_a = sqrt(S(1) + sinh_a * sinh_a);
-  const S cos_b = c / cosh_a;
   const S mean = (-(a * sinh_a * cos_b) - b * cosh_a * sin_b) / gap;
   return {mean, (cot_a - cot_b) / gap};
 }
