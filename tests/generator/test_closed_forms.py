@@ -138,6 +138,7 @@ def test_cayley_inverse_undoes_cayley(spec: AlgebraSpec, kernel: Kernel) -> None
 HIGH_PRECISION: dict[str, Callable[..., Any]] = ARITHMETIC | {
     "number": lambda x: mpmath.mpf(x.numerator) / x.denominator,
     "sqrt": mpmath.sqrt,
+    "length": mpmath.hypot,
 }
 
 

@@ -2111,28 +2111,30 @@ template <class S>
 /// sqrt: Motor -> Motor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 18 mul, 8 add (6 fused), 4 div, 1 select, 1 sqrt.
+/// Cost: 22 mul, 7 add (5 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S shifted =
       select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
-  const S factor = S(0.5) * (root / shifted);
-  const S turn = S(0.5) * -m.e123i / shifted / root;
-  return {.s = factor * shifted,
+  const S factor = S(1) / root;
+  const S per_root = S(0.5) * factor;
+  const S inverse = S(2) * factor * factor;
+  const S turn_e123i = inverse * m.e123i;
+  return {.s = S(0.5) * root,
           .e23 = factor * m.e23,
           .e31 = factor * m.e31,
           .e12 = factor * m.e12,
-          .e1i = dot(factor, m.e1i, turn, -m.e23),
-          .e2i = dot(factor, m.e2i, turn, -m.e31),
-          .e3i = dot(factor, m.e3i, turn, -m.e12),
-          .e123i = dot(factor, m.e123i, turn, shifted)};
+          .e1i = dot(factor, m.e1i, per_root, m.e23 * turn_e123i),
+          .e2i = dot(factor, m.e2i, per_root, m.e31 * turn_e123i),
+          .e3i = dot(factor, m.e3i, per_root, m.e12 * turn_e123i),
+          .e123i = per_root * m.e123i};
 }
 
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 71 mul, 47 add (41 fused), 5 div, 2 select, 2 sqrt.
+/// Cost: 54 mul, 30 add (25 fused), 4 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2144,30 +2146,35 @@ template <class S>
   const S root = scalar::sqrt(
       select(shifted > S(0), shifted + radius,
              -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) / (radius - shifted)));
-  const S factor = S(0.5) * (root / radius);
-  const S slip = S(-0.5) / radius / root;
-  return {
-      .s = dot(factor, shifted, slip, dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i)),
-      .e23 = dot(factor, m.e23, slip, m.e023i * m.e0i),
-      .e31 = -dot(factor, -m.e31, slip, -m.e031i * m.e0i),
-      .e12 = dot(factor, m.e12, slip, m.e012i * m.e0i),
-      .e1i = dot(factor, m.e1i, slip, dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i)),
-      .e2i = dot(factor, m.e2i, slip, dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i)),
-      .e3i = dot(factor, m.e3i, slip, dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i)),
-      .e123i = dot(
-          factor, m.e123i, slip,
-          dot(m.e123i, shifted, -m.e023i, m.e1i, -m.e031i, m.e2i, -m.e012i, m.e3i, m.e0i, m.e123i)),
-      .e0i = dot(factor, m.e0i, slip, dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12)),
-      .e023i = dot(factor, m.e023i, slip, dot(m.e023i, shifted, -m.e012i, m.e31, m.e031i, m.e12)),
-      .e031i =
-          -dot(factor, -m.e031i, slip, dot(-m.e031i, shifted, -m.e012i, m.e23, m.e023i, m.e12)),
-      .e012i = dot(factor, m.e012i, slip, dot(m.e012i, shifted, -m.e031i, m.e23, m.e023i, m.e31))};
+  const S per_root = S(0.5) / root;
+  const S inverse = S(1) / radius;
+  const S factor = S(0.5) * (root * inverse);
+  const S turn_e123i = inverse * m.e123i;
+  const S turn_e023i = inverse * m.e023i;
+  const S turn_e013i = inverse * m.e031i;
+  const S turn_e012i = inverse * m.e012i;
+  return {.s = S(0.5) * root,
+          .e23 = dot(factor, m.e23, per_root, -m.e0i * turn_e023i),
+          .e31 = -dot(factor, -m.e31, per_root, m.e0i * turn_e013i),
+          .e12 = dot(factor, m.e12, per_root, -m.e0i * turn_e012i),
+          .e1i = dot(factor, m.e1i, per_root,
+                     dot(m.e23, turn_e123i, -m.e2i, turn_e012i, m.e3i, turn_e013i)),
+          .e2i = dot(factor, m.e2i, per_root,
+                     dot(m.e31, turn_e123i, m.e1i, turn_e012i, -m.e3i, turn_e023i)),
+          .e3i = dot(factor, m.e3i, per_root,
+                     dot(m.e12, turn_e123i, -m.e1i, turn_e013i, m.e2i, turn_e023i)),
+          .e123i = per_root * m.e123i,
+          .e0i = dot(factor, m.e0i, per_root,
+                     dot(m.e23, turn_e023i, m.e31, turn_e013i, m.e12, turn_e012i)),
+          .e023i = per_root * m.e023i,
+          .e031i = per_root * m.e031i,
+          .e012i = per_root * m.e012i};
 }
 
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 116 mul, 80 add (66 fused), 5 div, 2 select, 2 sqrt.
+/// Cost: 86 mul, 51 add (43 fused), 4 div, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2182,37 +2189,40 @@ template <class S>
       shifted > S(0), shifted + radius,
       -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i) /
           (radius - shifted)));
-  const S factor = S(0.5) * (root / radius);
-  const S slip = S(-0.5) / radius / root;
-  return {
-      .s = dot(
-          factor, shifted, slip,
-          dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i)),
-      .e23 = dot(factor, m.e23, slip, dot(-m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i)),
-      .e31 = -dot(factor, -m.e31, slip, dot(m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i)),
-      .e12 = dot(factor, m.e12, slip, dot(-m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i)),
-      .e1i = dot(factor, m.e1i, slip, dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i)),
-      .e2i = dot(factor, m.e2i, slip, dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i)),
-      .e3i = dot(factor, m.e3i, slip, dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i)),
-      .e123i = dot(
-          factor, m.e123i, slip,
-          dot(m.e123i, shifted, -m.e023i, m.e1i, -m.e031i, m.e2i, -m.e012i, m.e3i, m.e0i, m.e123i)),
-      .e0i = dot(factor, m.e0i, slip, dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12)),
-      .e023i = dot(
-          factor, m.e023i, slip,
-          dot(m.e023i, shifted, -m.e012i, m.e31, m.e031i, m.e12, -m.e0123, m.e1i, m.e01, m.e123i)),
-      .e031i = -dot(
-          factor, -m.e031i, slip,
-          dot(-m.e031i, shifted, -m.e012i, m.e23, m.e023i, m.e12, m.e0123, m.e2i, -m.e02, m.e123i)),
-      .e012i = dot(
-          factor, m.e012i, slip,
-          dot(m.e012i, shifted, -m.e031i, m.e23, m.e023i, m.e31, -m.e0123, m.e3i, m.e03, m.e123i)),
-      .e01 = dot(factor, m.e01, slip, dot(-m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i)),
-      .e02 = dot(factor, m.e02, slip, dot(-m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03)),
-      .e03 = dot(factor, m.e03, slip, dot(-m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i)),
-      .e0123 = dot(
-          factor, m.e0123, slip,
-          dot(m.e0123, shifted, -m.e0123, m.e0i, m.e01, m.e023i, m.e02, m.e031i, m.e012i, m.e03))};
+  const S per_root = S(0.5) / root;
+  const S inverse = S(1) / radius;
+  const S factor = S(0.5) * (root * inverse);
+  const S turn_e123i = inverse * m.e123i;
+  const S turn_e023i = inverse * m.e023i;
+  const S turn_e013i = inverse * m.e031i;
+  const S turn_e012i = inverse * m.e012i;
+  const S turn_e0123 = inverse * m.e0123;
+  return {.s = S(0.5) * root,
+          .e23 = dot(factor, m.e23, per_root,
+                     dot(m.e1i, turn_e0123, -m.e0i, turn_e023i, m.e01, turn_e123i)),
+          .e31 = -dot(factor, -m.e31, per_root,
+                      dot(-m.e2i, turn_e0123, m.e0i, turn_e013i, -m.e02, turn_e123i)),
+          .e12 = dot(factor, m.e12, per_root,
+                     dot(m.e3i, turn_e0123, -m.e0i, turn_e012i, m.e03, turn_e123i)),
+          .e1i = dot(factor, m.e1i, per_root,
+                     dot(m.e23, turn_e123i, -m.e2i, turn_e012i, m.e3i, turn_e013i)),
+          .e2i = dot(factor, m.e2i, per_root,
+                     dot(m.e31, turn_e123i, m.e1i, turn_e012i, -m.e3i, turn_e023i)),
+          .e3i = dot(factor, m.e3i, per_root,
+                     dot(m.e12, turn_e123i, -m.e1i, turn_e013i, m.e2i, turn_e023i)),
+          .e123i = per_root * m.e123i,
+          .e0i = dot(factor, m.e0i, per_root,
+                     dot(m.e23, turn_e023i, m.e31, turn_e013i, m.e12, turn_e012i)),
+          .e023i = per_root * m.e023i,
+          .e031i = per_root * m.e031i,
+          .e012i = per_root * m.e012i,
+          .e01 = dot(factor, m.e01, per_root,
+                     dot(m.e23, turn_e0123, m.e02, turn_e012i, -m.e03, turn_e013i)),
+          .e02 = dot(factor, m.e02, per_root,
+                     dot(m.e31, turn_e0123, -m.e01, turn_e012i, m.e03, turn_e023i)),
+          .e03 = dot(factor, m.e03, per_root,
+                     dot(m.e12, turn_e0123, m.e01, turn_e013i, -m.e02, turn_e023i)),
+          .e0123 = per_root * m.e0123};
 }
 
 /// exp: Bivector -> Versor

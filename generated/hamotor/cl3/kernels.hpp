@@ -498,8 +498,7 @@ template <class S>
       select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
   const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
-  return {
-      .s = factor * shifted, .e23 = factor * r.e23, .e31 = factor * r.e31, .e12 = factor * r.e12};
+  return {.s = S(0.5) * root, .e23 = factor * r.e23, .e31 = factor * r.e31, .e12 = factor * r.e12};
 }
 
 /// exp: Bivector -> Rotor

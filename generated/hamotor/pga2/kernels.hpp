@@ -528,8 +528,7 @@ template <class S>
   const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
-  return {
-      .s = factor * shifted, .e12 = factor * m.e12, .e01 = factor * m.e01, .e02 = factor * m.e02};
+  return {.s = S(0.5) * root, .e12 = factor * m.e12, .e01 = factor * m.e01, .e02 = factor * m.e02};
 }
 
 /// exp: Bivector -> Motor

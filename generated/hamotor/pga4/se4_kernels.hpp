@@ -327,7 +327,7 @@ template <class S>
 /// exp: Rate -> Motor
 /// exp(B) = 1 + B + B²/2 + ….
 /// Any bivector: two commuting rotations or boosts, isoclinic, simple or null.
-/// Cost: 78 mul, 33 add (32 fused), 1 bivector_exponential.
+/// Cost: 84 mul, 43 add (36 fused), 1 bivector_exponential.
 template <class S>
 [[nodiscard]] constexpr Motor<S> exp(const se4::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
@@ -348,7 +348,15 @@ template <class S>
   const S square =
       dot(b_e12, b_e12, b_e13, b_e13, b_e23, b_e23, b_e14, b_e14, b_e24, b_e24, b_e34, b_e34);
   const S omega = w_e1234 * w_e1234;
-  const auto e = scalar::bivector_exponential(-square, S(4) * omega);
+  const S plus_0 = b_e12 - b_e34;
+  const S plus_1 = b_e13 + b_e24;
+  const S plus_2 = b_e14 - b_e23;
+  const S minus_0 = b_e12 + b_e34;
+  const S minus_1 = b_e13 - b_e24;
+  const S minus_2 = b_e14 + b_e23;
+  const auto e = scalar::bivector_exponential(
+      S(2) * w_e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+      dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
   const S quad = S(2) * e.quad;
   const S twisted = S(2) * e.twisted;
   return {
@@ -376,13 +384,18 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 55 mul, 23 add (22 fused), 1 bivector_logarithm.
+/// Cost: 54 mul, 28 add (22 fused), 1 bivector_logarithm.
 template <class S>
 [[nodiscard]] constexpr se4::Rate<S> log(const Motor<S>& m) noexcept {
-  const auto f = scalar::bivector_logarithm(
-      m.s,
-      dot(-m.e12, m.e12, -m.e13, m.e13, -m.e14, m.e14, -m.e23, m.e23, -m.e24, m.e24, -m.e34, m.e34),
-      m.e1234 * m.e1234);
+  const S plus_0 = m.e12 - m.e34;
+  const S plus_1 = m.e13 + m.e24;
+  const S plus_2 = m.e14 - m.e23;
+  const S minus_0 = m.e12 + m.e34;
+  const S minus_1 = m.e13 - m.e24;
+  const S minus_2 = m.e14 + m.e23;
+  const auto f =
+      scalar::bivector_logarithm(m.s, m.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+                                 dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
   return {.w12 = S(-2) * dot(f.bivector, m.e12, f.twisted, -m.e1234 * m.e34),
           .w13 = S(-2) * dot(f.bivector, m.e13, f.twisted, m.e1234 * m.e24),
           .w14 = S(-2) * dot(f.bivector, m.e14, f.twisted, -m.e1234 * m.e23),
@@ -402,7 +415,7 @@ template <class S>
 /// cayley: Rate -> Motor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 103 mul, 53 add (46 fused), 1 div.
+/// Cost: 108 mul, 63 add (49 fused), 1 div.
 template <class S>
 [[nodiscard]] constexpr Motor<S> cayley(const se4::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
@@ -423,12 +436,22 @@ template <class S>
   const S square =
       dot(b_e12, b_e12, b_e13, b_e13, b_e23, b_e23, b_e14, b_e14, b_e24, b_e24, b_e34, b_e34);
   const S omega = w_e1234 * w_e1234;
-  const S rest = S(1) + square;
-  const S inverse = S(1) / mul_add(rest, rest, -(S(4) * omega));
+  const S plus_0 = b_e12 - b_e34;
+  const S plus_1 = b_e13 + b_e24;
+  const S plus_2 = b_e14 - b_e23;
+  const S minus_0 = b_e12 + b_e34;
+  const S minus_1 = b_e13 - b_e24;
+  const S minus_2 = b_e14 + b_e23;
+  const S square_plus = dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2);
+  const S square_minus = dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2);
+  const S rest_plus = S(1) + square_plus;
+  const S rest_minus = S(1) + square_minus;
+  const S rest = S(0.5) * (rest_plus + rest_minus);
+  const S inverse = S(1) / (rest_plus * rest_minus);
   const S twice = S(2) * inverse;
   const S linear = rest * twice;
   const S even = S(2) * twice;
-  return {.s = (mul_add(square, -square, S(1)) + S(4) * omega) * inverse,
+  return {.s = mul_add(-square_plus, square_minus, S(1)) * inverse,
           .e12 = dot(linear, b_e12, even, -b_e34 * w_e1234),
           .e13 = dot(linear, b_e13, even, b_e24 * w_e1234),
           .e14 = dot(linear, b_e14, even, -b_e23 * w_e1234),
@@ -453,40 +476,45 @@ template <class S>
 /// cayley_inverse: Motor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 57 mul, 35 add (22 fused), 3 div, 2 select.
+/// Cost: 60 mul, 35 add (22 fused), 4 div, 2 select.
 template <class S>
 [[nodiscard]] constexpr se4::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const S plus_0 = m.e12 - m.e34;
-  const S minus_0 = m.e12 + m.e34;
   const S plus_1 = m.e13 + m.e24;
-  const S minus_1 = m.e13 - m.e24;
   const S plus_2 = m.e14 - m.e23;
+  const S minus_0 = m.e12 + m.e34;
+  const S minus_1 = m.e13 - m.e24;
   const S minus_2 = m.e14 + m.e23;
   const S cosine_plus = m.s + m.e1234;
+  const S cosine_minus = m.s - m.e1234;
   const S shifted_plus =
       select(cosine_plus > S(0), S(1) + cosine_plus,
              dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2) / (S(1) - cosine_plus));
-  const S cosine_minus = m.s - m.e1234;
   const S shifted_minus =
       select(cosine_minus > S(0), S(1) + cosine_minus,
              dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2) / (S(1) - cosine_minus));
-  const S shifted = S(0.5) * (shifted_plus + shifted_minus);
-  const S inverse = S(1) / (shifted_plus * shifted_minus);
-  const S linear = shifted * inverse;
-  return {.w12 = S(-2) * dot(linear, m.e12, inverse, m.e1234 * m.e34),
-          .w13 = S(-2) * dot(linear, m.e13, inverse, -m.e1234 * m.e24),
-          .w14 = S(-2) * dot(linear, m.e14, inverse, m.e1234 * m.e23),
-          .w23 = S(-2) * dot(linear, m.e23, inverse, m.e1234 * m.e14),
-          .w24 = S(-2) * dot(linear, m.e24, inverse, -m.e1234 * m.e13),
-          .w34 = S(-2) * dot(linear, m.e34, inverse, m.e12 * m.e1234),
-          .v1 = S(-2) *
-                dot(linear, m.e01, inverse, dot(m.e0123, m.e23, m.e0124, m.e24, m.e0134, m.e34)),
-          .v2 = S(-2) *
-                dot(linear, m.e02, inverse, dot(-m.e0123, m.e13, -m.e0124, m.e14, m.e0234, m.e34)),
-          .v3 = S(-2) *
-                dot(linear, m.e03, inverse, dot(m.e0123, m.e12, -m.e0134, m.e14, -m.e0234, m.e24)),
-          .v4 = S(-2) *
-                dot(linear, m.e04, inverse, dot(m.e0124, m.e12, m.e0134, m.e13, m.e0234, m.e23))};
+  const S inverse_plus = S(1) / shifted_plus;
+  const S inverse_minus = S(1) / shifted_minus;
+  const S linear = S(0.5) * (inverse_plus + inverse_minus);
+  const S q_e1234 = inverse_plus * m.e1234;
+  const S q_e0123 = inverse_plus * m.e0123;
+  const S q_e0124 = inverse_plus * m.e0124;
+  const S q_e0134 = inverse_plus * m.e0134;
+  const S q_e0234 = inverse_plus * m.e0234;
+  return {.w12 = S(-2) * dot(linear, m.e12, inverse_minus, m.e34 * q_e1234),
+          .w13 = S(-2) * dot(linear, m.e13, inverse_minus, -m.e24 * q_e1234),
+          .w14 = S(-2) * dot(linear, m.e14, inverse_minus, m.e23 * q_e1234),
+          .w23 = S(-2) * dot(linear, m.e23, inverse_minus, m.e14 * q_e1234),
+          .w24 = S(-2) * dot(linear, m.e24, inverse_minus, -m.e13 * q_e1234),
+          .w34 = S(-2) * dot(linear, m.e34, inverse_minus, m.e12 * q_e1234),
+          .v1 = S(-2) * dot(linear, m.e01, inverse_minus,
+                            dot(m.e23, q_e0123, m.e24, q_e0124, m.e34, q_e0134)),
+          .v2 = S(-2) * dot(linear, m.e02, inverse_minus,
+                            dot(-m.e13, q_e0123, -m.e14, q_e0124, m.e34, q_e0234)),
+          .v3 = S(-2) * dot(linear, m.e03, inverse_minus,
+                            dot(m.e12, q_e0123, -m.e14, q_e0134, -m.e24, q_e0234)),
+          .v4 = S(-2) * dot(linear, m.e04, inverse_minus,
+                            dot(m.e12, q_e0124, m.e13, q_e0134, m.e23, q_e0234))};
 }
 
 }  // namespace hamotor::pga4::se4

@@ -258,7 +258,7 @@ template <class S>
 /// exp: Rate -> Rotor
 /// exp(B) = 1 + B + B²/2 + ….
 /// Any bivector: two commuting rotations or boosts, isoclinic, simple or null.
-/// Cost: 38 mul, 13 add (12 fused), 1 bivector_exponential.
+/// Cost: 44 mul, 23 add (16 fused), 1 bivector_exponential.
 template <class S>
 [[nodiscard]] constexpr Rotor<S> exp(const so4::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
@@ -271,7 +271,15 @@ template <class S>
   const S square =
       dot(b_e12, b_e12, b_e13, b_e13, b_e23, b_e23, b_e14, b_e14, b_e24, b_e24, b_e34, b_e34);
   const S omega = w_e1234 * w_e1234;
-  const auto e = scalar::bivector_exponential(-square, S(4) * omega);
+  const S plus_0 = b_e12 - b_e34;
+  const S plus_1 = b_e13 + b_e24;
+  const S plus_2 = b_e14 - b_e23;
+  const S minus_0 = b_e12 + b_e34;
+  const S minus_1 = b_e13 - b_e24;
+  const S minus_2 = b_e14 + b_e23;
+  const auto e = scalar::bivector_exponential(
+      S(2) * w_e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+      dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
   const S quad = S(2) * e.quad;
   const S twisted = S(2) * e.twisted;
   return {.s = e.number,
@@ -288,13 +296,18 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 31 mul, 11 add (10 fused), 1 bivector_logarithm.
+/// Cost: 30 mul, 16 add (10 fused), 1 bivector_logarithm.
 template <class S>
 [[nodiscard]] constexpr so4::Rate<S> log(const Rotor<S>& r) noexcept {
-  const auto f = scalar::bivector_logarithm(
-      r.s,
-      dot(-r.e12, r.e12, -r.e13, r.e13, -r.e14, r.e14, -r.e23, r.e23, -r.e24, r.e24, -r.e34, r.e34),
-      r.e1234 * r.e1234);
+  const S plus_0 = r.e12 - r.e34;
+  const S plus_1 = r.e13 + r.e24;
+  const S plus_2 = r.e14 - r.e23;
+  const S minus_0 = r.e12 + r.e34;
+  const S minus_1 = r.e13 - r.e24;
+  const S minus_2 = r.e14 + r.e23;
+  const auto f =
+      scalar::bivector_logarithm(r.s, r.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+                                 dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
   return {.w12 = S(-2) * dot(f.bivector, r.e12, f.twisted, -r.e1234 * r.e34),
           .w13 = S(-2) * dot(f.bivector, r.e13, f.twisted, r.e1234 * r.e24),
           .w14 = S(-2) * dot(f.bivector, r.e14, f.twisted, -r.e1234 * r.e23),
@@ -306,7 +319,7 @@ template <class S>
 /// cayley: Rate -> Rotor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 43 mul, 17 add (14 fused), 1 div.
+/// Cost: 48 mul, 27 add (17 fused), 1 div.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> cayley(const so4::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
@@ -319,12 +332,22 @@ template <class S>
   const S square =
       dot(b_e12, b_e12, b_e13, b_e13, b_e23, b_e23, b_e14, b_e14, b_e24, b_e24, b_e34, b_e34);
   const S omega = w_e1234 * w_e1234;
-  const S rest = S(1) + square;
-  const S inverse = S(1) / mul_add(rest, rest, -(S(4) * omega));
+  const S plus_0 = b_e12 - b_e34;
+  const S plus_1 = b_e13 + b_e24;
+  const S plus_2 = b_e14 - b_e23;
+  const S minus_0 = b_e12 + b_e34;
+  const S minus_1 = b_e13 - b_e24;
+  const S minus_2 = b_e14 + b_e23;
+  const S square_plus = dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2);
+  const S square_minus = dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2);
+  const S rest_plus = S(1) + square_plus;
+  const S rest_minus = S(1) + square_minus;
+  const S rest = S(0.5) * (rest_plus + rest_minus);
+  const S inverse = S(1) / (rest_plus * rest_minus);
   const S twice = S(2) * inverse;
   const S linear = rest * twice;
   const S even = S(2) * twice;
-  return {.s = (mul_add(square, -square, S(1)) + S(4) * omega) * inverse,
+  return {.s = mul_add(-square_plus, square_minus, S(1)) * inverse,
           .e12 = dot(linear, b_e12, even, -b_e34 * w_e1234),
           .e13 = dot(linear, b_e13, even, b_e24 * w_e1234),
           .e14 = dot(linear, b_e14, even, -b_e23 * w_e1234),
@@ -337,32 +360,33 @@ template <class S>
 /// cayley_inverse: Rotor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 33 mul, 23 add (10 fused), 3 div, 2 select.
+/// Cost: 32 mul, 23 add (10 fused), 4 div, 2 select.
 template <class S>
 [[nodiscard]] constexpr so4::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const S plus_0 = r.e12 - r.e34;
-  const S minus_0 = r.e12 + r.e34;
   const S plus_1 = r.e13 + r.e24;
-  const S minus_1 = r.e13 - r.e24;
   const S plus_2 = r.e14 - r.e23;
+  const S minus_0 = r.e12 + r.e34;
+  const S minus_1 = r.e13 - r.e24;
   const S minus_2 = r.e14 + r.e23;
   const S cosine_plus = r.s + r.e1234;
+  const S cosine_minus = r.s - r.e1234;
   const S shifted_plus =
       select(cosine_plus > S(0), S(1) + cosine_plus,
              dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2) / (S(1) - cosine_plus));
-  const S cosine_minus = r.s - r.e1234;
   const S shifted_minus =
       select(cosine_minus > S(0), S(1) + cosine_minus,
              dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2) / (S(1) - cosine_minus));
-  const S shifted = S(0.5) * (shifted_plus + shifted_minus);
-  const S inverse = S(1) / (shifted_plus * shifted_minus);
-  const S linear = shifted * inverse;
-  return {.w12 = S(-2) * dot(linear, r.e12, inverse, r.e1234 * r.e34),
-          .w13 = S(-2) * dot(linear, r.e13, inverse, -r.e1234 * r.e24),
-          .w14 = S(-2) * dot(linear, r.e14, inverse, r.e1234 * r.e23),
-          .w23 = S(-2) * dot(linear, r.e23, inverse, r.e1234 * r.e14),
-          .w24 = S(-2) * dot(linear, r.e24, inverse, -r.e1234 * r.e13),
-          .w34 = S(-2) * dot(linear, r.e34, inverse, r.e12 * r.e1234)};
+  const S inverse_plus = S(1) / shifted_plus;
+  const S inverse_minus = S(1) / shifted_minus;
+  const S linear = S(0.5) * (inverse_plus + inverse_minus);
+  const S q_e1234 = inverse_plus * r.e1234;
+  return {.w12 = S(-2) * dot(linear, r.e12, inverse_minus, q_e1234 * r.e34),
+          .w13 = S(-2) * dot(linear, r.e13, inverse_minus, -q_e1234 * r.e24),
+          .w14 = S(-2) * dot(linear, r.e14, inverse_minus, q_e1234 * r.e23),
+          .w23 = S(-2) * dot(linear, r.e23, inverse_minus, q_e1234 * r.e14),
+          .w24 = S(-2) * dot(linear, r.e24, inverse_minus, -q_e1234 * r.e13),
+          .w34 = S(-2) * dot(linear, r.e34, inverse_minus, q_e1234 * r.e12)};
 }
 
 }  // namespace hamotor::pga4::so4

@@ -188,19 +188,21 @@ def exp_kernel(
     (parameter,) = parameters_for(operand)
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
-    parts = square_of(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    square = poly.apply_bilinear(algebra.geometric, b, b)
+    parts = square_of(algebra, writer, square, "w", where)
     twisted = {
         blade: p
         for blade, p in poly.apply_bilinear(algebra.geometric, b, parts.quad).items()
         if grade(blade) == 2
     }
-    writer.let(
-        "e",
-        Call(
-            "bivector_exponential",
-            (polynomial_expression(parts.number), polynomial_expression(parts.omega)),
-        ),
-    )
+    negated = {x: poly.scaled(p, -1) for x, p in square.items()}
+    planes = _on_planes(algebra, writer, negated, parts.quad)
+    if planes:
+        w = polynomial_expression(poly.scaled(parts.quad[planes.blade], parts.content))
+        arguments: tuple[Expression, ...] = (w, planes.plus, planes.minus)
+    else:
+        arguments = (polynomial_expression(parts.number), polynomial_expression(parts.omega))
+    writer.let("e", Call("bivector_exponential", arguments))
     out: dict[Blade, Expression] = {0: Name("e.number")}
     terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("e.bivector"), b)]
     for name, value in (("quad", parts.quad), ("twisted", twisted)):
@@ -230,9 +232,15 @@ def log_kernel(
         for b, p in poly.apply_bilinear(algebra.geometric, quad, bivector).items()
         if grade(b) == 2
     }
-    arguments = tuple(
-        polynomial_expression(p) for p in (value[0], square.get(0, {}), rho.get(0, {}))
-    )
+    negated = {b: poly.scaled(p, -1) for b, p in square.items()}
+    planes = _on_planes(algebra, writer, negated, quad)
+    c = polynomial_expression(value[0])
+    if planes:
+        q = polynomial_expression(quad[planes.blade])
+        arguments: tuple[Expression, ...] = (c, q, planes.plus, planes.minus)
+    else:
+        others = (square.get(0, {}), rho.get(0, {}))
+        arguments = (c, *(polynomial_expression(p) for p in others))
     writer.let("f", Call("bivector_logarithm", arguments))
     terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("f.bivector"), bivector)]
     if twisted:
@@ -253,17 +261,29 @@ def cayley_kernel(
     (parameter,) = parameters_for(operand)
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
-    parts = square_of(algebra, writer, poly.apply_bilinear(algebra.geometric, b, b), "w", where)
+    square = poly.apply_bilinear(algebra.geometric, b, b)
+    parts = square_of(algebra, writer, square, "w", where)
     one: Polynomial = {(): 1}
     s = polynomial_expression(parts.number)
-    left = poly.added({0: one}, {0: parts.number}, -1)[0]
-    rest = writer.let("rest", polynomial_expression(left))
     twisted = poly.apply_bilinear(algebra.geometric, b, parts.quad)
-    if parts.omega:
+    negated = {x: poly.scaled(p, -1) for x, p in square.items()}
+    planes = _on_planes(algebra, writer, negated, parts.quad)
+    even: Expression
+    determinant: Expression
+    if planes:
+        planes = planes.bound(writer, "square")
+        shifted = planes.plus_one().bound(writer, "rest")
+        rest = shifted.mean(writer, "rest")
+        determinant = shifted.product
+        even = MultiplyAdd(negative(planes.plus), planes.minus, ONE)
+    else:
+        left = poly.added({0: one}, {0: parts.number}, -1)[0]
+        rest = writer.let("rest", polynomial_expression(left))
         omega = polynomial_expression(parts.omega)
         determinant = MultiplyAdd(rest, rest, negative(omega))
-        inverse = writer.let("inverse", Quotient(ONE, determinant))
         even = Sum(MultiplyAdd(negative(s), s, ONE), omega)
+    if parts.omega:
+        inverse = writer.let("inverse", Quotient(ONE, determinant))
         twice = writer.let("twice", Product(number(2), inverse))
         linear = writer.let("linear", Product(rest, twice))
         twice = writer.let("even", _times(parts.content, twice))
@@ -282,81 +302,94 @@ def cayley_kernel(
     return Kernel("cayley", "(1 + B)(1 − B)⁻¹", program, None, namespace, None, notes)
 
 
-def _with_signs(
-    writer: Writer, prefix: str, number_part: Polynomial, quad_part: Polynomial
-) -> tuple[Expression, Expression] | None:
-    """S + q and S − q, for S = Σ ±(x² + y²) and q = Σ ±2 x y, as sums of ±(x ± y)².
+@dataclass(frozen=True)
+class Planes:
+    """What an element of grades 0 and 4 is where J = 1 and where J = −1; J: `blade`, J² = 1."""
 
-    So nothing cancels between S and q.  None where they are not of that kind.
-    """
-    if len(number_part) != 2 * len(quad_part):
-        return None
-    sums: tuple[list[tuple[Expression, ...]], list[tuple[Expression, ...]]] = ([], [])
-    for index, (monomial, twice) in enumerate(quad_part.items()):
-        x, *others = monomial
-        square = number_part.get((x, x), 0)
-        if len(others) != 1 or number_part.get((others[0],) * 2) != square:
-            return None
-        if abs(square) != 1 or abs(twice) != 2:
-            return None
-        for terms, sign, side in zip(sums, (1, -1), ("plus", "minus"), strict=True):
-            y: Expression = Name(others[0])
-            total = Sum(Name(x), y if sign * twice * square > 0 else negative(y))
-            name = writer.let(f"{prefix}{side}_{index}", total)
-            terms.append((name if square > 0 else negative(name), name))
-    plus, minus = (sum_of_products(terms) for terms in sums)
-    return plus, minus
+    blade: Blade
+    plus: Expression
+    minus: Expression
+
+    @property
+    def product(self) -> Expression:
+        """The number that is a + b J times a − b J."""
+        return Product(self.plus, self.minus)
+
+    def bound(self, writer: Writer, name: str) -> Planes:
+        """The same under names."""
+        plus = writer.let(f"{name}_plus", self.plus)
+        return Planes(self.blade, plus, writer.let(f"{name}_minus", self.minus))
+
+    def plus_one(self) -> Planes:
+        """1 + this."""
+        return Planes(self.blade, Sum(ONE, self.plus), Sum(ONE, self.minus))
+
+    def mean(self, writer: Writer, name: str) -> Expression:
+        """The part without J."""
+        return writer.let(name, Product(number(Fraction(1, 2)), Sum(self.plus, self.minus)))
 
 
 def _on_planes(
-    algebra: Algebra,
-    writer: Writer,
-    square: PolynomialMultivector,
-    quad: PolynomialMultivector,
-    prefix: str,
-) -> tuple[Expression, Expression] | None:
-    """What S + W, a square, is where J = 1 and where J = −1, without cancellation.
+    algebra: Algebra, writer: Writer, square: PolynomialMultivector, quad: PolynomialMultivector
+) -> Planes | None:
+    """S + W, a square, where J = 1 and where J = −1, without cancellation between S and W.
 
-    J: the only blade of grade 4 in `quad` whose square is not 0.  None unless that is 1.
+    J: the only blade of grade 4 in `quad` whose square is not 0.  With S = Σ ±(x² + y²) and
+    W = Σ ±2 x y J + … these are sums of ±(x ± y)².  None where they are not of that kind.
     """
-    squares = [(b, algebra.blade_product(b, b).get(0, 0)) for b in quad]
-    turning = [(b, x) for b, x in squares if x]
-    if len(turning) != 1 or turning[0][1] != 1:
+    squares = {b: algebra.blade_product(b, b).get(0, 0) for b in quad}
+    turning = [b for b, x in squares.items() if x]
+    if len(turning) != 1 or squares[turning[0]] != 1:
         return None
-    (blade, _), *_ = turning
-    return _with_signs(writer, prefix, square.get(0, {}), square.get(blade, {}))
+    (blade,) = turning
+    number_part, quad_part = square.get(0, {}), square.get(blade, {})
+    pairs: list[tuple[str, str, Rational, Rational]] = []
+    for monomial, twice in quad_part.items():
+        x, *others = monomial
+        sign = number_part.get((x, x), 0)
+        if len(others) != 1 or number_part.get((others[0],) * 2) != sign:
+            return None
+        if abs(sign) != 1 or abs(twice) != 2:
+            return None
+        pairs.append((x, others[0], sign, sign * twice))
+    if len(number_part) != 2 * len(pairs):
+        return None
+    sides = []
+    for side, name in ((1, "plus"), (-1, "minus")):
+        terms: list[tuple[Expression, ...]] = []
+        for index, (x, y, sign, twice) in enumerate(pairs):
+            other = Name(y) if side * twice > 0 else negative(Name(y))
+            total = writer.let(f"{name}_{index}", Sum(Name(x), other))
+            terms.append((total if sign > 0 else negative(total), total))
+        sides.append(sum_of_products(terms))
+    plus, minus = sides
+    return Planes(blade, plus, minus)
 
 
-def _one_plus_eigenvalues(
+def _one_plus_versor(
     algebra: Algebra, writer: Writer, value: PolynomialMultivector
-) -> tuple[Expression, Expression] | None:
-    """1 + s + q and 1 + s − q of M ~M = 1, s + q J + … its grades 0 and 4, J² = 1.
+) -> Planes | None:
+    """1 + s + Q, s + Q = q J + … the grades 0 and 4 of M, M ~M = 1.
 
     Where s ± q < 0 as (1 − (s ± q)²) / (1 − (s ± q)), with 1 − (s + q J)² = −<M>₂² in squares:
     so nothing cancels where a pair of planes turns by half an angle of π.
-    None where no such J exists.
     """
     bivector = {b: p for b, p in value.items() if grade(b) == 2}
     square = poly.apply_bilinear(algebra.geometric, bivector, bivector)
-    rest = _on_planes(
-        algebra,
-        writer,
-        {b: poly.scaled(p, -1) for b, p in square.items()},
-        {b: p for b, p in value.items() if grade(b) == 4},
-        "",
-    )
+    negated = {b: poly.scaled(p, -1) for b, p in square.items()}
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    rest = _on_planes(algebra, writer, negated, quad)
     if rest is None:
         return None
-    (blade,) = (b for b in value if grade(b) == 4 and algebra.blade_product(b, b))
-    s, q = (polynomial_expression(value[b]) for b in (0, blade))
-    found = []
-    for side, quad, far in zip(("plus", "minus"), (q, negative(q)), rest, strict=True):
-        cosine = writer.let(f"cosine_{side}", Sum(s, quad))
-        near = Sum(ONE, cosine)
+    s, q = (polynomial_expression(value[b]) for b in (0, rest.blade))
+    cosines = Planes(rest.blade, Sum(s, q), Sum(s, negative(q))).bound(writer, "cosine")
+
+    def shifted(cosine: Expression, far: Expression) -> Expression:
         beyond = Quotient(far, Sum(ONE, negative(cosine)))
-        found.append(writer.let(f"shifted_{side}", Select(cosine, near, beyond)))
-    plus, minus = found
-    return plus, minus
+        return Select(cosine, Sum(ONE, cosine), beyond)
+
+    plus, minus = shifted(cosines.plus, rest.plus), shifted(cosines.minus, rest.minus)
+    return Planes(rest.blade, plus, minus).bound(writer, "shifted")
 
 
 def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
@@ -364,6 +397,23 @@ def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
     if any(g % 2 for g in parameter.element.grades) or max(parameter.element.grades) > 4:
         raise UsageError(f"{where}: {parameter.element.name} must be even, with grades 0 to 4")
     return value
+
+
+def _times_name(
+    algebra: Algebra,
+    writer: Writer,
+    prefix: str,
+    value: PolynomialMultivector,
+    factor: str,
+    sign: int = 1,
+) -> PolynomialMultivector:
+    """The value times a named number, under names."""
+    return {
+        b: writer.let_polynomial(
+            f"{prefix}_{algebra.blade_name(b)}", poly.times(p, {(factor,): sign})
+        )
+        for b, p in value.items()
+    }
 
 
 def cayley_inverse_kernel(
@@ -378,33 +428,46 @@ def cayley_inverse_kernel(
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most 5 dimensions")
-    planes = _one_plus_eigenvalues(algebra, writer, value)
-    rest = _mean(writer, planes) if planes else Name(_one_plus_scalar(algebra, writer, value))
+    planes = _one_plus_versor(algebra, writer, value)
+    if planes:
+        # one division after the other: their product may be beyond the range
+        sides = [
+            writer.let(f"inverse_{side}", Quotient(ONE, x))
+            for side, x in (("plus", planes.plus), ("minus", planes.minus))
+        ]
+        linear = Planes(planes.blade, *sides).mean(writer, "linear")
+        quad = _times_name(algebra, writer, "q", quad, "inverse_plus")
+        inverse = sides[1]
+    else:
+        rest = Name(_one_plus_scalar(algebra, writer, value))
+        if omega and (other := _square_subtracted(omega[0])):
+            # scaled by a power of two, because squares may vanish near −1
+            writer.let("scaling", Call("scaling", (Call("max_abs", (rest, other)),)))
+            inward = Name("scaling.in")
+            near = writer.let("near", Product(inward, rest))
+            slip = writer.let("slip", Product(inward, other))
+            square = MultiplyAdd(near, near, Product(slip, slip))
+            writer.let("inverse", Quotient(inward, square))
+            linear = writer.let("linear", Product(near, Name("inverse")))
+            quad = {b: {("slip",): x for x in p.values()} for b, p in quad.items()}
+            inverse = Name("inverse")
+        elif omega:
+            less = negative(polynomial_expression(omega[0]))
+            inverse = writer.let("inverse", Quotient(ONE, MultiplyAdd(rest, rest, less)))
+            linear = writer.let("linear", Product(rest, inverse))
+        else:
+            linear = writer.let("linear", Quotient(ONE, rest))
+            inverse = writer.let("inverse", Product(linear, linear)) if quad else linear
     twisted = {
         b: poly.scaled(p, -1)
         for b, p in poly.apply_bilinear(algebra.geometric, bivector, quad).items()
         if grade(b) == 2
     }
-    if omega:
-        square = negative(polynomial_expression(omega[0]))
-        determinant = Product(*planes) if planes else MultiplyAdd(rest, rest, square)
-        inverse = writer.let("inverse", Quotient(ONE, determinant))
-        linear = writer.let("linear", Product(rest, inverse))
-    else:
-        linear = writer.let("linear", Quotient(ONE, rest))
-        inverse = writer.let("inverse", Product(linear, linear)) if quad else linear
     out = _combination([(linear, bivector), (inverse, twisted)], {})
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "(M − 1)(M + 1)⁻¹, M ~M = 1"
     notes = ("Infinite at M = −1, which no finite bivector reaches.",)
     return Kernel("cayley_inverse", law, program, None, namespace, None, notes)
-
-
-def _mean(writer: Writer, planes: tuple[Expression, Expression]) -> Name:
-    """1 + s from what it is with q and with −q."""
-    mean = writer.let("shifted", Product(number(Fraction(1, 2)), Sum(*planes)))
-    assert isinstance(mean, Name)
-    return mean
 
 
 def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
@@ -423,7 +486,12 @@ def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: s
         out = _combination([(factor, reversed_)], {})
     else:
         omega = negative(polynomial_expression(parts.omega)) if parts.omega else None
-        squared = MultiplyAdd(norm, norm, omega) if omega is not None else Product(norm, norm)
+        squared: Expression = Product(norm, norm)
+        if omega is not None:
+            squared = MultiplyAdd(norm, norm, omega)
+        if planes := _on_planes(algebra, writer, square, parts.quad):
+            planes = planes.bound(writer, "norm2")
+            norm, squared = planes.mean(writer, "norm2"), planes.product
         inverse = writer.let("inverse", Quotient(ONE, squared))
         factor = writer.let("factor", Product(norm, inverse))
         slip = writer.let("slip", _times(-parts.content, inverse))
@@ -518,26 +586,72 @@ def _one_plus_scalar(algebra: Algebra, writer: Writer, value: PolynomialMultivec
 
 
 def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
-    """√M = (1 + M) (N + W)^(−1/2) for M ~M = 1, N + W = (1 + ~M)(1 + M) = 2 (1 + s) + 2 Q.
+    """√M = (1 + M) (2 N + 2 Q)^(−1/2), where M ~M = 1, 1 + M = N + <M>₂ + Q, Q of grade 4.
 
-    s + Q: M's grades 0 and 4.
+    With r = √(N² − Q²) and u = √(N + r) this is u/2 + Q/(2u) + <M>₂ (u − Q/u)/(2r).
     """
     (parameter,) = parameters_for(operand)
     writer = Writer()
     value = _versor(parameter, where)
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
     quad = {b: p for b, p in value.items() if grade(b) == 4}
-    planes = _one_plus_eigenvalues(algebra, writer, value)
-    rest = _mean(writer, planes).text if planes else _one_plus_scalar(algebra, writer, value)
-    shifted: Polynomial = {(rest,): 1}
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(omega.keys() - {0}):
         raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
-    parts = Square(shifted, quad, 1, omega.get(0, {}))
-    value[0] = shifted
-    out = _over_root(algebra, writer, value, parts, planes, twice=True)
+    half = number(Fraction(1, 2))
+    if planes := _one_plus_versor(algebra, writer, value):
+        roots = [
+            writer.let(f"root_{side}", Call("sqrt", (Product(half, x),)))
+            for side, x in (("plus", planes.plus), ("minus", planes.minus))
+        ]
+        radius = writer.let("radius", Product(number(2), Product(*roots)))
+        root = writer.let("root", Sum(*roots))
+    else:
+        norm = Name(_one_plus_scalar(algebra, writer, value))
+        radius = norm
+        square: Expression = Product(number(2), norm)
+        if omega:
+            less = MultiplyAdd(norm, norm, negative(polynomial_expression(omega[0])))
+            other = _square_subtracted(omega[0])
+            length = Call("length", (norm, other)) if other else Call("sqrt", (less,))
+            radius = writer.let("radius", length)
+            square = Sum(norm, radius)
+            if any(x < 0 for x in omega[0].values()):
+                # boosts beside half an angle near π: N < 0, and nothing may cancel
+                far = Quotient(
+                    negative(polynomial_expression(omega[0])), Sum(radius, negative(norm))
+                )
+                square = Select(norm, square, far)
+        root = writer.let("root", Call("sqrt", (square,)))
+    out: dict[Blade, Expression] = {0: Product(half, root)}
+    if not quad:
+        out = _combination([(writer.let("factor", Quotient(ONE, root)), bivector)], out)
+    else:
+        # Q first by one root and then by the other: their product may be beyond the range
+        if omega:
+            per_root = writer.let("per_root", Quotient(half, root))
+            inverse = writer.let("inverse", Quotient(ONE, radius))
+            factor = writer.let("factor", Product(half, Product(root, inverse)))
+        else:
+            factor = writer.let("factor", Quotient(ONE, root))
+            per_root = writer.let("per_root", Product(half, factor))
+            writer.let("inverse", Product(Product(number(2), factor), factor))
+        turned = _times_name(algebra, writer, "turn", quad, "inverse", -1)
+        twisted = poly.apply_bilinear(algebra.geometric, bivector, turned)
+        twisted = {b: p for b, p in twisted.items() if grade(b) == 2}
+        out = _combination([(per_root, quad), (factor, bivector), (per_root, twisted)], out)
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
     return Kernel("sqrt", "√m: half the motion, √m √m = m", program, None, "", None, notes)
+
+
+def _square_subtracted(omega: Polynomial) -> Name | None:
+    """The x of ω = −x²."""
+    if len(omega) == 1:
+        (((x, *others), factor),) = omega.items()
+        if factor == -1 and others == [x]:
+            return Name(x)
+    return None
 
 
 def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
@@ -560,57 +674,30 @@ def _over_root(
     writer: Writer,
     value: PolynomialMultivector,
     parts: Square,
-    planes: tuple[Expression, Expression] | None = None,
-    *,
-    twice: bool = False,
 ) -> dict[Blade, Expression]:
-    """A (N + Q)^(−1/2) for a square N + Q that commutes with A; twice: A (2 N + 2 Q)^(−1/2).
-
-    planes: N + q and N − q, q² = Q², where they are known better than from N and q.
-    """
+    """A (N + Q)^(−1/2) for a square N + Q that commutes with A."""
     half = number(Fraction(1, 2))
     norm = polynomial_expression(parts.number)
-    content = ratio(-parts.content, 2)
-    if planes and twice:
-        roots = [
-            writer.let(f"root_{side}", Call("sqrt", (Product(number(2), x),)))
-            for side, x in zip(("plus", "minus"), planes, strict=True)
-        ]
-        radius = writer.let("radius", Product(*roots))
-        root = writer.let("root", Sum(*roots))
-        content = 4 * content
-    else:
-        radius = norm
-        doubled: Expression = Product(number(2), norm)
-        if parts.omega:
-            omega = negative(polynomial_expression(parts.omega))
-            radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
-            doubled = Sum(norm, radius)
-            if twice and any(x < 0 for x in parts.omega.values()):
-                # boosts beside half an angle near π: N < 0, and nothing may cancel
-                doubled = Select(norm, doubled, Quotient(omega, Sum(radius, negative(norm))))
-        square = doubled if twice else Product(half, doubled) if parts.omega else norm
-        root = writer.let("root", Call("sqrt", (square,)))
+    radius = square = norm
+    if parts.omega:
+        omega = negative(polynomial_expression(parts.omega))
+        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
+        square = Product(half, Sum(norm, radius))
+    root = writer.let("root", Call("sqrt", (square,)))
     if not parts.quad:
         factor = writer.let("factor", Quotient(ONE, root))
         return _combination([(factor, value)], {})
 
-    def over(x: Expression) -> Expression:
-        # near M = −1 the product of the roots, which are near 0 there, may underflow
-        if twice:
-            return Quotient(Quotient(x, radius), root)
-        return Quotient(x, Product(root, radius))
-
-    share: Expression = Quotient(root, radius)
-    factor = writer.let("factor", Product(half, share) if twice else share)
+    factor = writer.let("factor", Quotient(root, radius))
     turned = poly.apply_bilinear(algebra.geometric, value, parts.quad)
+    content = ratio(-parts.content, 2)
     quad = next(iter(parts.quad.values()))
     if len(parts.quad) == 1 and len(quad) == 1:
         # one grade-4 blade: take it into the factor, so that each component costs one fma
         (blade,) = parts.quad
         turned = poly.apply_bilinear(algebra.geometric, value, {blade: {(): 1}})
         part = polynomial_expression(poly.scaled(quad, content))
-        slip = writer.let("turn", over(part))
+        slip = writer.let("turn", Quotient(part, Product(root, radius)))
     else:
-        slip = writer.let("slip", over(number(content)))
+        slip = writer.let("slip", Quotient(number(content), Product(root, radius)))
     return _combination([(factor, value), (slip, turned)], {})

@@ -73,6 +73,37 @@ template <class S>
   return {even.x, even.y, odd.x, odd.y};
 }
 
+/// By the eigenvalues high = S + w and low = S − w of B² as an element of the ring, w² = ω.
+template <class S>
+[[nodiscard]] BivectorExponential<S> isoclinic_exponential(const S& high, const S& low,
+                                                           const S& w) noexcept {
+  const S half(0.5);
+  const S cosh_high = cosh_root(high);
+  const S cosh_low = cosh_root(low);
+  const S sinh_high = sinhc_root(high);
+  const S sinh_low = sinhc_root(low);
+  const S share = half / w;
+  return {half * (cosh_high + cosh_low), share * (cosh_high - cosh_low),
+          half * (sinh_high + sinh_low), share * (sinh_high - sinh_low)};
+}
+
+/// By the eigenvalues (S ± gap)/2 of B² on its planes, gap² = S² − ω.
+template <class S>
+[[nodiscard]] BivectorExponential<S> plane_exponential(const S& s, const S& omega,
+                                                       const S& gap) noexcept {
+  const S half(0.5);
+  const S large = half * (s < S(0) ? s - gap : s + gap);
+  const S small = S(0.25) * omega / large;
+  const S c_large = cosh_root(large);
+  const S c_small = cosh_root(small);
+  const S h_large = sinhc_root(large);
+  const S h_small = sinhc_root(small);
+  const S inverse = S(1) / (large - small);
+  return {c_large * c_small, half * (h_large * h_small),
+          inverse * mul_add(large * h_large, c_small, -(small * h_small) * c_large),
+          half * inverse * mul_add(c_large, h_small, -h_large * c_small)};
+}
+
 }  // namespace detail
 
 /// The four numbers of exp B from S = <B²>₀ and ω = W² (theory.md §7).
@@ -85,30 +116,21 @@ template <class S>
 template <class S>
 [[nodiscard]] BivectorExponential<S> bivector_exponential(const S& s, const S& omega) noexcept {
   const S root = sqrt(abs(omega));
-  const S half(0.5);
   if (!(abs(s) + root > S(1))) return detail::exponential_series(s, omega);
-  if (omega > S(0.25) * (s * s)) {
-    const S high = s + root;
-    const S low = s - root;
-    const S cosh_high = detail::cosh_root(high);
-    const S cosh_low = detail::cosh_root(low);
-    const S sinh_high = detail::sinhc_root(high);
-    const S sinh_low = detail::sinhc_root(low);
-    const S share = half / root;
-    return {half * (cosh_high + cosh_low), share * (cosh_high - cosh_low),
-            half * (sinh_high + sinh_low), share * (sinh_high - sinh_low)};
-  }
-  const S gap = sqrt(mul_add(s, s, -omega));
-  const S large = half * (s < S(0) ? s - gap : s + gap);
-  const S small = S(0.25) * omega / large;
-  const S c_large = detail::cosh_root(large);
-  const S c_small = detail::cosh_root(small);
-  const S h_large = detail::sinhc_root(large);
-  const S h_small = detail::sinhc_root(small);
-  const S inverse = S(1) / (large - small);
-  return {c_large * c_small, half * (h_large * h_small),
-          inverse * mul_add(large * h_large, c_small, -(small * h_small) * c_large),
-          half * inverse * mul_add(c_large, h_small, -h_large * c_small)};
+  if (omega > S(0.25) * (s * s)) return detail::isoclinic_exponential(s + root, s - root, root);
+  return detail::plane_exponential(s, omega, sqrt(mul_add(s, s, -omega)));
+}
+
+/// The same for algebras with a blade J of grade 4, J² = 1, from w in W = w J + … and, without
+/// cancellation between S and W, what −B² is where J = 1 and where J = −1.
+template <class S>
+[[nodiscard]] BivectorExponential<S> bivector_exponential(const S& w, const S& plus,
+                                                          const S& minus) noexcept {
+  const S s = S(-0.5) * (plus + minus);
+  const S omega = w * w;
+  if (!(abs(s) + abs(w) > S(1))) return detail::exponential_series(s, omega);
+  if (omega > S(0.25) * (s * s)) return detail::isoclinic_exponential(-plus, -minus, w);
+  return detail::plane_exponential(s, omega, sqrt(plus * minus));
 }
 
 }  // namespace hamotor::scalar

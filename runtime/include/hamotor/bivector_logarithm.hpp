@@ -66,6 +66,30 @@ template <class S>
   return {even, odd};
 }
 
+/// Of C with the eigenvalues c ± q and `plus`, `minus` = 1 − (c ± q)².
+template <class S>
+[[nodiscard]] BivectorLogarithm<S> interpolated_logarithm(const S& c, const S& q, const S& square,
+                                                          const S& plus, const S& minus) noexcept {
+  const S half(0.5);
+  const S f_plus = angle_over_sine(plus, c + q);
+  const S f_minus = angle_over_sine(minus, c - q);
+  // separated in the eigenvalues of C
+  if (abs(q) > S(0.25) * abs(square)) {
+    return {half * (f_plus + f_minus), half * (f_plus - f_minus) / q};
+  }
+  // one plane dominates: a and b are separated, a + b and a − b are near each other
+  const bool boost = plus + minus < S(0);
+  const S sum = boost ? S(asinh(sqrt(abs(plus)))) : S(atan2(sqrt(abs(plus)), c + q));
+  const S difference = boost ? S(asinh(sqrt(abs(minus)))) : S(atan2(sqrt(abs(minus)), c - q));
+  const S a = half * (sum + difference);
+  const S b = half * (difference - sum);
+  const S sign = boost ? S(-1) : S(1);
+  const S cot_a = angle_cotangent(sign * a * a);
+  const S cot_b = angle_cotangent(sign * b * b);
+  const S gap = squared_sine(sign * a * a) - squared_sine(sign * b * b);
+  return {half * (f_plus + f_minus), (cot_a - cot_b) / gap};
+}
+
 }  // namespace detail
 
 /// The two numbers of log R from c = <R>₀, S = <<R>₂²>₀ and ρ = <R>₄² (a number).
@@ -79,7 +103,6 @@ template <class S>
 template <class S>
 [[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square,
                                                       const S& rho) noexcept {
-  const S half(0.5);
   const S root = sqrt(abs(rho));
   if (c > S(0) && abs(square) + S(2) * root < S(0.25)) {
     // 1 − c without cancellation: c² = 1 + S − ρ
@@ -88,30 +111,12 @@ template <class S>
   }
   if (!(rho < S(0))) {
     const S twice = S(2) * c * root;
-    const S plus = -(square + twice);
-    const S minus = -(square - twice);
-    const S f_plus = detail::angle_over_sine(plus, c + root);
-    const S f_minus = detail::angle_over_sine(minus, c - root);
-    // separated in the eigenvalues of C
-    if (root > S(0.25) * abs(square)) {
-      return {half * (f_plus + f_minus), half * (f_plus - f_minus) / root};
-    }
-    // one plane dominates: a and b are separated, a + b and a − b are near each other
-    const bool boost = plus + minus < S(0);
-    const S sum = boost ? S(asinh(sqrt(abs(plus)))) : S(atan2(sqrt(abs(plus)), c + root));
-    const S difference = boost ? S(asinh(sqrt(abs(minus)))) : S(atan2(sqrt(abs(minus)), c - root));
-    const S a = half * (sum + difference);
-    const S b = half * (difference - sum);
-    const S sign = boost ? S(-1) : S(1);
-    const S cot_a = detail::angle_cotangent(sign * a * a);
-    const S cot_b = detail::angle_cotangent(sign * b * b);
-    const S gap = detail::squared_sine(sign * a * a) - detail::squared_sine(sign * b * b);
-    return {half * (f_plus + f_minus), (cot_a - cot_b) / gap};
+    return detail::interpolated_logarithm(c, root, square, -(square + twice), -(square - twice));
   }
   // a boost by a and a rotation by b: c = cosh a cos b, √−ρ = sinh a sin b
   const S spread = sqrt(mul_add(square, square, S(-4) * c * c * rho));
   // λ = (sinh a cos b)² and (cosh a sin b)², whose difference is `square`
-  const S larger = half * (abs(square) + spread);
+  const S larger = S(0.5) * (abs(square) + spread);
   const S smaller = larger > S(0) ? -(c * c * rho) / larger : S(0);
   const S boost_part = square < S(0) ? smaller : larger;
   const S turn_part = square < S(0) ? larger : smaller;
@@ -129,6 +134,19 @@ template <class S>
   // (f₊ + f₋)/2 with a → i a
   const S mean = (-(a * sinh_a * cos_b) - b * cosh_a * sin_b) / gap;
   return {mean, (cot_a - cot_b) / gap};
+}
+
+/// The same for algebras with a blade J of grade 4, J² = 1: of C = c + q J + … and, without
+/// cancellation between S and W, what −<R>₂² = 1 − C² is where J = 1 and where J = −1.
+template <class S>
+[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& q, const S& plus,
+                                                      const S& minus) noexcept {
+  const S square = S(-0.5) * (plus + minus);
+  if (c > S(0) && abs(square) + S(2) * abs(q) < S(0.25)) {
+    const S rho = q * q;
+    return detail::logarithm_series((rho - square) / (S(1) + c), S(-1), rho);
+  }
+  return detail::interpolated_logarithm(c, q, square, plus, minus);
 }
 
 }  // namespace hamotor::scalar

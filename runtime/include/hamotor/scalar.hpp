@@ -303,6 +303,15 @@ template <class S>
           choose(from_large.root_out, from_small.root_out)};
 }
 
+/// √(x² + y²), whose squares neither overflow nor vanish.
+template <class S>
+[[nodiscard]] constexpr S length(const S& x, const S& y) noexcept {
+  const Scaling<S> scale = scaling(max_abs(x, y));
+  const S a = scale.in * x;
+  const S b = scale.in * y;
+  return scale.out * sqrt(mul_add(a, a, b * b));
+}
+
 /// The rounding error of a product: a b = product + product_error exactly (barring underflow).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S product_error(const S& a, const S& b,
