@@ -449,7 +449,8 @@ def cayley_inverse_kernel(
             square = MultiplyAdd(near, near, Product(slip, slip))
             writer.let("inverse", Quotient(inward, square))
             linear = writer.let("linear", Product(near, Name("inverse")))
-            quad = {b: {("slip",): x for x in p.values()} for b, p in quad.items()}
+            ((blade, p),) = quad.items()
+            quad = {blade: dict.fromkeys((("slip",),), *p.values())}
             inverse = Name("inverse")
         elif omega:
             less = negative(polynomial_expression(omega[0]))
