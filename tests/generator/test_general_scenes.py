@@ -26,6 +26,7 @@ from hamotor.mechanics.hamiltonian import coadjoint
 from hamotor.mechanics.system import System
 from hamotor.scene import GeneralScene, Scene, parse_scene, read_scene
 from hamotor.scene.general import product
+from hamotor.scene.reading import BUNDLED
 
 ORACLES = Path(__file__).resolve().parents[1] / "oracles"
 RHS = "initial_rhs (time derivative of M and mu at t=0)"
@@ -714,6 +715,18 @@ def test_the_pendulum_moves_in_conformal_algebra_as_in_projective() -> None:
     for k, name in enumerate(("e1i", "e2i", "e3i")):
         here = one.trajectory[f"brick.momentum.e0{k + 1}"]
         assert np.abs(here - other.trajectory[f"brick.momentum.{name}"]).max() <= 1e-12
+
+
+def test_two_bodies_of_1e12_kg_move_alike_in_both_algebras(tmp_path: Path) -> None:
+    """With constants that no integer of C++ holds, and two bodies that pull at each other."""
+    text = (BUNDLED / "double_asteroid.toml").read_text(encoding="utf-8")
+    text = text.replace('algebra = "pga3"', 'algebra = "cga3"\ngroup = "SE3"')
+    one = hamotor.load("double_asteroid").run(end=20000)
+    other = load(text, tmp_path).run(end=20000)
+    for body in ("primary", "moon"):
+        assert np.ptp(one.position(body), axis=0).max() > 500
+        assert np.abs(one.position(body) - other.position(body)).max() <= 1e-12 * 2000
+        assert np.abs(one.rotation(body) - other.rotation(body)).max() <= 1e-12
 
 
 @pytest.mark.parametrize("far", [1e6, 1e8])
