@@ -86,7 +86,7 @@ def test_auto_meets_a_small_tolerance_with_the_higher_order(tolerance: float, me
     assert run.report["tolerance"]["achieved"] <= tolerance
 
 
-@pytest.mark.parametrize("method", ["rkmk4", "splitting2"])
+@pytest.mark.parametrize("method", ["rkmk4", "rk4", "splitting2"])
 def test_the_methods_agree_where_the_steps_are_short(method: str) -> None:
     simulation = hamotor.load("tumble")
     reference = simulation.run(method="rkmk4", step=1e-3)

@@ -101,7 +101,7 @@ TEST(ExampleScene, gives_the_state_back_in_the_users_frame) {
 }
 
 TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
-  for (const char* method : {"rkmk4", "splitting2"}) {
+  for (const char* method : {"rkmk4", "rk4", "splitting2"}) {
     void* run = hamotor_start(method, 2.0, 0.001, start.data());
     ASSERT_NE(run, nullptr);
     Row first{};

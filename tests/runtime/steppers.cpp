@@ -11,6 +11,7 @@
 
 namespace {
 
+using hamotor::Rk4;
 using hamotor::Rkmk4;
 using hamotor::Splitting2;
 using hamotor::Summation;
@@ -41,6 +42,7 @@ double measured_order(const System& system, int coarse) {
 template <class System>
 void expect_orders(const System& system) {
   EXPECT_NEAR(measured_order<Rkmk4<System>>(system, 60), 4, 0.1);
+  EXPECT_NEAR(measured_order<Rk4<System>>(system, 120), 4, 0.1);
   EXPECT_NEAR(measured_order<Splitting2<System>>(system, 100), 2, 0.1);
 }
 

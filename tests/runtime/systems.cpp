@@ -90,6 +90,7 @@ TYPED_TEST(Systems, fulfil_the_concepts) {
   static_assert(HamiltonianSystem<System>);
   static_assert(SplitSystem<System>);
   static_assert(hamotor::Stepper<hamotor::Rkmk4<System>, System>);
+  static_assert(hamotor::Stepper<hamotor::Rk4<System>, System>);
   static_assert(hamotor::Stepper<hamotor::Splitting2<System>, System>);
   static_assert(!HamiltonianSystem<int>);
   static_assert(!hamotor::Stepper<int, System>);

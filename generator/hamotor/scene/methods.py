@@ -34,12 +34,12 @@ ANY = Form.SPLIT | Form.GENERAL
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
+    Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
     Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
     Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),
     Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT),
     Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT),
     Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT),
-    Method("rk4", 4, "classical Runge-Kutta, with --representation matrix only", Form.MATRIX),
 )
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
 """What a scene may ask for."""

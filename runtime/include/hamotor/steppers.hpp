@@ -198,6 +198,102 @@ class Rkmk4 {
   S work_{};
 };
 
+/// The classical Runge–Kutta method of order 4 on the components of M and μ, put back on the group
+/// after every step.
+///
+/// No exponentials: about half the time of `Rkmk4`, whose error is smaller where bodies turn fast.
+/// Four evaluations of rate and forque a step; not symplectic.
+template <HamiltonianSystem System>
+class Rk4 {
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Motor = typename G::template Element<S>;
+  using Momentum = typename G::template Momentum<S>;
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  static constexpr int order = 4;
+  static constexpr std::string_view name = "rk4";
+
+  /// Takes `state` from t to t + h.  Flat: a slope that is called returns through memory.
+  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                                          const S& h) noexcept {
+    const S half_step = S(0.5) * h;
+    const Slope one = slope(system, state, t);
+    const Slope two = slope(system, moved(state, half_step, one), t + half_step);
+    const Slope three = slope(system, moved(state, half_step, two), t + half_step);
+    const Slope four = slope(system, moved(state, h, three), t + h);
+
+    S worst(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      auto& motor = state.motors[i];
+      motor = mul_add(h / S(6), mean(one.motors[i], two.motors[i], three.motors[i], four.motors[i]),
+                      motor);
+      const auto defect = unit_defect(motor);
+      worst = scalar::max_abs(worst, detail::size(defect));
+      motor = motor + unit_correction(motor, defect);
+      state.momenta[i] =
+          mul_add(h / S(6), mean(one.force[i], two.force[i], three.force[i], four.force[i]),
+                  state.momenta[i]);
+    }
+    if constexpr (PoweredSystem<System>) {
+      work_ = mul_add(h / S(6), mean(one.power, two.power, three.power, four.power), work_);
+    }
+    detail::record(drift_, worst);
+  }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return work_;
+  }
+
+ private:
+  /// Ṁ, μ̇ and dH/dt.
+  struct Slope {
+    std::array<Motor, n> motors;
+    std::array<Momentum, n> force;
+    S power{};
+  };
+
+  /// Six times the mean of a step.
+  template <class T>
+  [[nodiscard]] static constexpr T mean(const T& one, const T& two, const T& three,
+                                        const T& four) noexcept {
+    return mul_add(S(2), two + three, one + four);
+  }
+
+  [[nodiscard]] static constexpr Slope slope(const System& system, const StateOf<System>& state,
+                                             const S& t) noexcept {
+    const auto now = gradient(system, state, t);
+    Slope result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      result.motors[i] = kinematics(state.motors[i], now.rates[i]);
+      result.force[i] = coadjoint(now.rates[i], state.momenta[i]);
+      if constexpr (System::has_forque) result.force[i] = result.force[i] - now.forques[i];
+    }
+    if constexpr (PoweredSystem<System>) result.power = system.power(state, t);
+    return result;
+  }
+
+  [[nodiscard]] static constexpr StateOf<System> moved(const StateOf<System>& state, const S& h,
+                                                       const Slope& along) noexcept {
+    StateOf<System> there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = mul_add(h, along.motors[i], state.motors[i]);
+      there.momenta[i] = mul_add(h, along.force[i], state.momenta[i]);
+    }
+    return there;
+  }
+
+  Drift<S> drift_;
+  S work_{};
+};
+
 /// Symmetric, symplectic splitting of order 2, 4, 6, 8 or 10: kicks and free motions in turn, where
 /// a free motion is exact or itself a symmetric composition of exact flows.
 ///
@@ -335,12 +431,12 @@ namespace detail {
 
 template <class System>
 struct Steppers {
-  using type = std::tuple<Rkmk4<System>>;
+  using type = std::tuple<Rkmk4<System>, Rk4<System>>;
 };
 template <SplitSystem System>
 struct Steppers<System> {
-  using type = std::tuple<Rkmk4<System>, Splitting2<System>, Splitting4<System>, Splitting6<System>,
-                          Splitting8<System>, Splitting10<System>>;
+  using type = std::tuple<Rkmk4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
+                          Splitting6<System>, Splitting8<System>, Splitting10<System>>;
 };
 
 }  // namespace detail
