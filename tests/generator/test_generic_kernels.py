@@ -17,20 +17,21 @@ BUNDLED = [name for name, _ in bundled_scenes()]
 STEPS = 20
 
 
-def rows(
-    simulation: hamotor.Simulation, scalar: str
-) -> tuple[list[SceneLibrary], list[np.ndarray]]:
+def agree_in(simulation: hamotor.Simulation, scalar: str) -> None:
+    """After some steps of every method that both kinds of kernels have."""
     libraries = [
         simulation.compile(kernels=kernels, scalar=scalar, method="rkmk4").library
         for kernels in ("generated", "generic")
     ]
-    found = []
-    for library in libraries:
-        step = (simulation.step or 1e-3) / 4
-        with library.start("rkmk4", step=step, state=simulation.state) as run:
-            assert run.advance(STEPS, 0, None) == STEPS
-            found.append(run.observe_wide())
-    return libraries, found
+    rounding = float(np.finfo(np.double if scalar == "double" else np.longdouble).eps)
+    for method in ("rkmk4", "rk4"):
+        found = []
+        for library in libraries:
+            step = (simulation.step or 1e-3) / 4
+            with library.start(method, step=step, state=simulation.state) as run:
+                assert run.advance(STEPS, 0, None) == STEPS
+                found.append(run.observe_wide())
+        agree(libraries, found, rounding)
 
 
 def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: float) -> None:
@@ -46,7 +47,7 @@ def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: floa
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_bundled_scenes_move_alike(name: str) -> None:
-    agree(*rows(hamotor.load(name), "double"), float(np.finfo(np.float64).eps))
+    agree_in(hamotor.load(name), "double")
 
 
 @pytest.mark.parametrize(("algebra", "group"), GROUPS)
@@ -67,7 +68,7 @@ def test_every_group_moves_alike(algebra: str, group: str, tmp_path: Path) -> No
         f'[hamiltonian]\nexpression = "{energy} + {coupled} + motor(it).s^2/3"\n'
         "[time]\nend = 1\nstep = 0.01\n"
     )
-    agree(*rows(hamotor.load(path), "long_double"), float(np.finfo(np.longdouble).eps))
+    agree_in(hamotor.load(path), "long_double")
 
 
 def test_a_run_says_which_kernels_it_had() -> None:
