@@ -17,14 +17,18 @@ BUNDLED = [name for name, _ in bundled_scenes()]
 STEPS = 20
 
 
-def agree_in(simulation: hamotor.Simulation, scalar: str) -> None:
-    """After some steps of every method that both kinds of kernels have."""
+def agree_in(simulation: hamotor.Simulation, scalar: str, *methods: str) -> None:
+    """After some steps.
+
+    Stages of `rk4` leave the group, where forques of rigid bodies and those of the general form
+    differ: it agrees to rounding where both are of the general form.
+    """
     libraries = [
         simulation.compile(kernels=kernels, scalar=scalar, method="rkmk4").library
         for kernels in ("generated", "generic")
     ]
     rounding = float(np.finfo(np.double if scalar == "double" else np.longdouble).eps)
-    for method in ("rkmk4", "rk4"):
+    for method in methods:
         found = []
         for library in libraries:
             step = (simulation.step or 1e-3) / 4
@@ -47,7 +51,7 @@ def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: floa
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_bundled_scenes_move_alike(name: str) -> None:
-    agree_in(hamotor.load(name), "double")
+    agree_in(hamotor.load(name), "double", "rkmk4")
 
 
 @pytest.mark.parametrize(("algebra", "group"), GROUPS)
@@ -68,7 +72,7 @@ def test_every_group_moves_alike(algebra: str, group: str, tmp_path: Path) -> No
         f'[hamiltonian]\nexpression = "{energy} + {coupled} + motor(it).s^2/3"\n'
         "[time]\nend = 1\nstep = 0.01\n"
     )
-    agree_in(hamotor.load(path), "long_double")
+    agree_in(hamotor.load(path), "long_double", "rkmk4", "rk4")
 
 
 def test_a_run_says_which_kernels_it_had() -> None:
