@@ -23,12 +23,12 @@ def agree_in(simulation: hamotor.Simulation, scalar: str, *methods: str) -> None
     Stages of `rk4` leave the group, where forques of rigid bodies and those of the general form
     differ: it agrees to rounding where both are of the general form.
     """
-    libraries = [
-        simulation.compile(kernels=kernels, scalar=scalar, method="rkmk4").library
-        for kernels in ("generated", "generic")
-    ]
     rounding = float(np.finfo(np.double if scalar == "double" else np.longdouble).eps)
     for method in methods:
+        libraries = [
+            simulation.compile(kernels=kernels, scalar=scalar, method=method).library
+            for kernels in ("generated", "generic")
+        ]
         found = []
         for library in libraries:
             step = (simulation.step or 1e-3) / 4
