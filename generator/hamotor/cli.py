@@ -176,8 +176,9 @@ def _parser() -> _Parser:
         help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
     )
     bench = command("bench", "measure speed and error against other libraries", _bench)
-    bench.add_argument("what", metavar="kernels", nargs="?", default="kernels")
-    bench.add_argument("--quick", action="store_true", help="double only, fewer repetitions")
+    bench.add_argument("what", metavar="kernels|steps", nargs="?", default="kernels")
+    bench.add_argument("scenes", metavar="SCENE", nargs="*", help="for steps: which scenes")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions, double only")
     bench.add_argument("--out", metavar="DIR", help="where to write (default: runs/bench)")
     bench.add_argument("--json", action="store_true", help="print the account, not the table")
     return parser
@@ -540,17 +541,22 @@ def _test(parsed: argparse.Namespace) -> int:
 
 
 def _bench(parsed: argparse.Namespace) -> int:
-    benchmarks = ("kernels",)
+    benchmarks = ("kernels", "steps")
     if parsed.what not in benchmarks:
         raise UsageError(
-            f'no benchmark "{parsed.what}"; there is {", ".join(benchmarks)}.'
+            f'no benchmark "{parsed.what}"; there are {", ".join(benchmarks)}.'
             f"{suggest(parsed.what, benchmarks)}"
         )
-    from hamotor.bench import bench_kernels
+    from hamotor.bench import bench_kernels, bench_steps
 
     out = Path(parsed.out) if parsed.out else Path("runs") / "bench"
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: is not a folder")
+    if parsed.what == "steps":
+        bench_steps(parsed.scenes, out, json=parsed.json, quick=parsed.quick)
+        return 0
+    if parsed.scenes:
+        raise UsageError("bench kernels takes no scenes; bench steps does.")
     bench_kernels(out, json=parsed.json, quick=parsed.quick)
     return 0
 

@@ -3,5 +3,6 @@
 from __future__ import annotations
 
 from hamotor.bench.kernels import bench_kernels
+from hamotor.bench.steps import bench_steps
 
-__all__ = ["bench_kernels"]
+__all__ = ["bench_kernels", "bench_steps"]

@@ -1,0 +1,39 @@
+"""The benchmark of whole steps: every form of a scene, with its error."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hamotor.bench import bench_steps
+from hamotor.errors import UsageError
+
+
+@pytest.mark.slow
+def test_forms_of_a_scene_differ_in_speed_and_agree_in_error(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    account = bench_steps(["planar"], tmp_path, quick=True)
+    assert json.loads((tmp_path / "steps.json").read_text(encoding="utf-8")) == account
+    rows = {(row["form"], row["method"]): row for row in account["rows"]}
+    forms = {form for form, _ in rows}
+    assert forms == {"generated", "generic", "matrix"}
+    assert rows["generated", "rkmk4"]["ratio"] == 1
+    assert rows["generic", "rkmk4"]["ratio"] > 2
+    errors = [rows[form, "rkmk4"]["errors"]["position (m)"] for form in forms]
+    assert errors == pytest.approx([errors[0]] * 3, rel=0.1)
+    assert rows["generated", "splitting8"]["errors"]["position (m)"] < errors[0]
+    assert "planar, step" in capsys.readouterr().out
+
+
+def test_a_scene_without_a_step_is_refused(tmp_path: Path) -> None:
+    scene = tmp_path / "loose.toml"
+    scene.write_text(
+        'algebra = "pga2"\n[[body]]\nname = "a"\nmass = 1\ninertia = 1\n'
+        "[time]\nend = 1\ntolerance = 1e-6\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(UsageError, match="needs \\[time\\] step"):
+        bench_steps([str(scene)])
