@@ -171,6 +171,20 @@ def test_higher_orders_meet_a_reference_in_longer_steps(method: str) -> None:
     assert hamotor.compare(reference, run).largest < (1e-6 if method == "splitting4" else 1e-9)
 
 
+@pytest.mark.parametrize("name", ["heavy_top", "breathing_body"])
+def test_gauss_collocation_runs_every_form_of_a_scene(name: str) -> None:
+    simulation = hamotor.load(name)
+    reference = simulation.run(method="rkmk4", end=0.2, step=5e-5, every=40)
+    run = simulation.run(method="gauss6", end=0.2, step=2e-3, every=1)
+    assert hamotor.compare(reference, run).largest < 1e-9
+
+
+def test_stages_that_do_not_converge_stop_the_run() -> None:
+    with pytest.raises(hamotor.RunFailed, match="finite") as caught:
+        hamotor.load("heavy_top").run(method="gauss4", step=2.5)
+    assert caught.value.run.status == "failed"
+
+
 def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:
     with pytest.raises(hamotor.UsageError, match="this scene offers auto, rkmk4"):
         choose_method("splitting4", methods_offered(Form.GENERAL))

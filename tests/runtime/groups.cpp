@@ -9,6 +9,7 @@
 #include "hamotor/cga2/cga2.hpp"
 #include "hamotor/cga3/cga3.hpp"
 #include "hamotor/cl3/cl3.hpp"
+#include "hamotor/gauss.hpp"
 #include "hamotor/pga2/pga2.hpp"
 #include "hamotor/pga3/pga3.hpp"
 #include "hamotor/pga4/pga4.hpp"
@@ -82,6 +83,13 @@ class Group : public testing::Test {
     if (drift != nullptr) *drift = method.drift().largest;
     return state;
   }
+  template <class Method>
+  static State stepped_with(int steps) {
+    State state = start<G>();
+    Method method;
+    for (int k = 0; k < steps; ++k) method.do_step(System{}, state, 0, 1.0 / steps);
+    return state;
+  }
   static double error(const State& a, const State& b) {
     return std::max(distance(a.motors[0], b.motors[0]), distance(a.momenta[0], b.momenta[0]));
   }
@@ -112,6 +120,18 @@ TYPED_TEST(Group, rkmk4_has_order_4) {
   const double fine = this->error(this->stepped(2 * steps), reference);
   EXPECT_GT(fine, 1e-12) << "nothing to measure";
   EXPECT_NEAR(std::log2(coarse / fine), 4, 0.1);
+}
+
+TYPED_TEST(Group, gauss_collocation_has_order_4_and_keeps_the_spatial_momentum) {
+  using Gauss4 = hamotor::Gauss4<Quadratic<TypeParam>>;
+  const auto reference = this->template stepped_with<hamotor::Gauss8<Quadratic<TypeParam>>>(80);
+  constexpr int steps = TypeParam::dimension > 3 ? 20 : 10;
+  const auto end = this->template stepped_with<Gauss4>(2 * steps);
+  const double coarse = this->error(this->template stepped_with<Gauss4>(steps), reference);
+  const double fine = this->error(end, reference);
+  EXPECT_GT(fine, 1e-12) << "nothing to measure";
+  EXPECT_NEAR(std::log2(coarse / fine), 4, 0.1);
+  EXPECT_LT(distance(this->spatial(end), this->spatial(start<TypeParam>())), 1e-12);
 }
 
 TYPED_TEST(Group, spatial_momentum_is_conserved_to_the_methods_error) {

@@ -40,6 +40,10 @@ METHODS = (
     Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT),
     Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT),
     Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT),
+    Method("lie_midpoint", 2, "midpoint rule on the group, implicit, symplectic for any H", ANY),
+    Method("gauss4", 4, "Gauss collocation on the group, the same with 2 stages", ANY),
+    Method("gauss6", 6, "the same with 3 stages", ANY),
+    Method("gauss8", 8, "the same with 4 stages", ANY),
 )
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
 """What a scene may ask for."""

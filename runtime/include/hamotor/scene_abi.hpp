@@ -18,10 +18,10 @@
 #include <type_traits>
 #include <variant>
 
+#include "hamotor/methods.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/space.hpp"
 #include "hamotor/state.hpp"
-#include "hamotor/steppers.hpp"
 #include "hamotor/systems.hpp"
 
 namespace hamotor {

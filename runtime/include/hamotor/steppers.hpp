@@ -8,7 +8,6 @@
 #include <array>
 #include <cstddef>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 
 #include "hamotor/scalar.hpp"
@@ -426,23 +425,5 @@ template <SplitSystem System, Summation summation = Summation::compensated>
 using Splitting8 = Splitting<System, 8, summation>;
 template <SplitSystem System, Summation summation = Summation::compensated>
 using Splitting10 = Splitting<System, 10, summation>;
-
-namespace detail {
-
-template <class System>
-struct Steppers {
-  using type = std::tuple<Rkmk4<System>, Rk4<System>>;
-};
-template <SplitSystem System>
-struct Steppers<System> {
-  using type = std::tuple<Rkmk4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
-                          Splitting6<System>, Splitting8<System>, Splitting10<System>>;
-};
-
-}  // namespace detail
-
-/// The steppers that a system can be stepped with.
-template <class System>
-using SteppersOf = typename detail::Steppers<System>::type;
 
 }  // namespace hamotor

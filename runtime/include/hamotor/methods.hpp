@@ -1,0 +1,32 @@
+// The methods that a system can be stepped with.
+#pragma once
+
+#include <tuple>
+
+#include "hamotor/gauss.hpp"
+#include "hamotor/state.hpp"
+#include "hamotor/steppers.hpp"
+
+namespace hamotor {
+
+namespace detail {
+
+template <class System>
+struct Steppers {
+  using type = std::tuple<Rkmk4<System>, Rk4<System>, LieMidpoint<System>, Gauss4<System>,
+                          Gauss6<System>, Gauss8<System>>;
+};
+template <SplitSystem System>
+struct Steppers<System> {
+  using type = std::tuple<Rkmk4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
+                          Splitting6<System>, Splitting8<System>, Splitting10<System>,
+                          LieMidpoint<System>, Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+};
+
+}  // namespace detail
+
+/// The steppers that a system can be stepped with.
+template <class System>
+using SteppersOf = typename detail::Steppers<System>::type;
+
+}  // namespace hamotor

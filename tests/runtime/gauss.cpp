@@ -1,0 +1,281 @@
+// Laws of Gauss collocation on the group: order, symplecticity, reversal, momentum, failure.
+#include "hamotor/gauss.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <type_traits>
+#include <vector>
+
+#include "sample_systems.hpp"
+
+namespace {
+
+using hamotor::Gauss;
+using hamotor::Gauss8;
+using hamotor::LieMidpoint;
+using hamotor::StateOf;
+using sample::distance;
+using sample::generic_state;
+using sample::spatial_momentum;
+using Wide = long double;
+
+template <class System>
+using Of = std::remove_const_t<System>;
+
+/// H = ½ E² (1 + ¼ sin 3t) for the energy E of another system: neither separable nor autonomous.
+template <class Base>
+struct Squared {
+  using Group = typename Base::Group;
+  using Scalar = typename Base::Scalar;
+  using State = StateOf<Base>;
+  static constexpr std::size_t bodies = Base::bodies;
+  static constexpr bool has_forque = Base::has_forque;
+  Base base;
+
+  [[nodiscard]] Scalar factor(const Scalar& t) const noexcept {
+    return 1 + Scalar(0.25) * std::sin(3 * t);
+  }
+  [[nodiscard]] Scalar energy(const State& state, const Scalar& t) const noexcept {
+    const Scalar e = base.energy(state);
+    return Scalar(0.5) * e * e * factor(t);
+  }
+  [[nodiscard]] auto gradient(const State& state, const Scalar& t) const noexcept {
+    auto result = hamotor::gradient(base, state, t);
+    const Scalar by = base.energy(state) * factor(t);
+    for (auto& rate : result.rates) rate = by * rate;
+    for (auto& forque : result.forques) forque = by * forque;
+    return result;
+  }
+};
+
+template <class Method, class System>
+auto stepped(const System& system, StateOf<System> state, typename System::Scalar h, int steps,
+             typename System::Scalar from = 0) {
+  using S = typename System::Scalar;
+  Method method;
+  for (int k = 0; k < steps; ++k) method.do_step(system, state, from + S(k) * h, h);
+  return state;
+}
+
+template <std::size_t stages, class System>
+void expect_order(const System& system, int coarse) {
+  const auto start = generic_state(system);
+  const Wide end = Wide(0.5);
+  const auto reference = stepped<Gauss8<System>>(system, start, end / 60, 60);
+  const auto error = [&](int steps) {
+    return distance(stepped<Gauss<System, stages>>(system, start, end / Wide(steps), steps),
+                    reference);
+  };
+  const double fine = error(2 * coarse);
+  EXPECT_GT(fine, 1e-17) << "nothing to measure";
+  EXPECT_NEAR(std::log2(error(coarse) / fine), 2.0 * static_cast<double>(stages), 0.1);
+}
+
+template <class System>
+void expect_orders(const System& system, int coarse) {
+  expect_order<1>(system, 20);
+  expect_order<2>(system, 10);
+  expect_order<3>(system, coarse);
+}
+
+TEST(Gauss, has_order_of_twice_its_stages) {
+  expect_orders(sample::free_se3<Wide>(), 4);
+  expect_orders(sample::free_so3<Wide>(), 3);
+  expect_orders(sample::forced_se3<Wide>(), 20);
+  expect_orders(sample::forced_so3<Wide>(), 10);
+  expect_orders(sample::forced_se2<Wide>(), 8);
+  expect_orders(sample::two_bodies_se3<Wide>(), 20);
+}
+
+TEST(Gauss, has_its_order_where_small_momenta_stand_beside_a_fast_spin) {
+  using Top = hamotor::PivotedBody<sample::SO3, Wide, hamotor::RotationSplit{0, 2, 1, 1}>;
+  const hamotor::RigidBodies system{
+      std::tuple{Top(1, {0.3L, 0.3L, 0.05L}, {0, 0, 0.5L}, {0, 0, 0})},
+      std::tuple{hamotor::UniformGravity<sample::SO3, Wide>{{0, 0, -9.81L}}}};
+  using System = Of<decltype(system)>;
+  auto start = generic_state(system);
+  start.momenta[0] = {0, 0, 150 * 0.05L};
+  const auto after = [&](int steps) {
+    return stepped<hamotor::Gauss6<System>>(system, start, Wide(0.1) / steps, steps);
+  };
+  const auto reference = stepped<hamotor::Splitting8<System>>(system, start, Wide(0.002), 50);
+  const double fine = distance(after(160), reference);
+  EXPECT_LT(fine, 1e-9);
+  EXPECT_NEAR(std::log2(distance(after(80), reference) / fine), 6, 0.1);
+}
+
+TEST(Gauss, has_its_order_where_the_energy_does_not_separate_and_depends_on_time) {
+  const auto base = sample::forced_so3<Wide>();
+  expect_orders(Squared<Of<decltype(base)>>{base}, 10);
+}
+
+TEST(Gauss, of_four_stages_has_order_8) {
+  const auto system = sample::forced_so3<Wide>();
+  using System = Of<decltype(system)>;
+  const auto start = generic_state(system);
+  const auto after = [&](int steps) {
+    return stepped<Gauss8<System>>(system, start, 1 / Wide(steps), steps);
+  };
+  const auto reference = after(60);
+  EXPECT_NEAR(std::log2(distance(after(8), reference) / distance(after(16), reference)), 8, 0.1);
+}
+
+/// By how much a step changes the canonical form of T*G, ω = ρ₂(ξ₁) − ρ₁(ξ₂) + μ([ξ₁, ξ₂]) for
+/// δM = M ξ and δμ = ρ, its Jacobian by differences of fourth order in long double.
+template <class Method, class System>
+double symplectic_defect(const System& system, Wide h) {
+  using G = typename System::Group;
+  using Rate = typename G::template Rate<Wide>;
+  using Momentum = typename G::template Momentum<Wide>;
+  constexpr auto n = static_cast<std::size_t>(G::dimension);
+  struct Tangent {
+    Rate xi;
+    Momentum rho;
+  };
+  const auto start = generic_state(system);
+  const Wide from = Wide(0.3);
+  const auto image = stepped<Method>(system, start, h, 1, from);
+  constexpr Wide e = 1e-4L;
+  const auto moved = [&](const Tangent& by, Wide factor) {
+    auto state = start;
+    state.motors[0] = gp(start.motors[0], exp(factor * by.xi));
+    state.momenta[0] = start.momenta[0] + factor * by.rho;
+    const auto there = stepped<Method>(system, state, h, 1, from);
+    return Tangent{G::log(gp(reverse(image.motors[0]), there.motors[0])),
+                   there.momenta[0] - image.momenta[0]};
+  };
+  std::vector<Tangent> before;
+  std::vector<Tangent> after;
+  for (std::size_t a = 0; a < 2 * n; ++a) {
+    std::array<Wide, n> unit{};
+    unit[a % n] = 1;
+    const Tangent basis{a < n ? Rate::from(unit) : Rate{},
+                        a < n ? Momentum{} : Momentum::from(unit)};
+    const auto p1 = moved(basis, e);
+    const auto m1 = moved(basis, -e);
+    const auto p2 = moved(basis, 2 * e);
+    const auto m2 = moved(basis, -2 * e);
+    before.push_back(basis);
+    after.push_back({(1 / (12 * e)) * (Wide(8) * (p1.xi - m1.xi) - (p2.xi - m2.xi)),
+                     (1 / (12 * e)) * (Wide(8) * (p1.rho - m1.rho) - (p2.rho - m2.rho))});
+  }
+  const auto form = [](const Tangent& a, const Tangent& b, const Momentum& mu) {
+    return pairing(b.rho, a.xi) - pairing(a.rho, b.xi) + pairing(mu, ad(a.xi, b.xi));
+  };
+  Wide worst = 0;
+  for (std::size_t a = 0; a < 2 * n; ++a) {
+    for (std::size_t b = 0; b < a; ++b) {
+      worst = std::max(worst, std::abs(form(after[a], after[b], image.momenta[0]) -
+                                       form(before[a], before[b], start.momenta[0])));
+    }
+  }
+  return static_cast<double>(worst);
+}
+
+template <class System>
+void expect_symplectic(const System& system) {
+  const Wide h = Wide(0.15);
+  EXPECT_LT((symplectic_defect<Gauss<System, 1>>(system, h)), 1e-12);
+  EXPECT_LT((symplectic_defect<Gauss<System, 2>>(system, h)), 1e-12);
+  EXPECT_LT((symplectic_defect<Gauss<System, 3>>(system, h)), 1e-12);
+  EXPECT_LT((symplectic_defect<Gauss<System, 4>>(system, h)), 1e-12);
+  EXPECT_GT((symplectic_defect<hamotor::Rkmk4<System>>(system, h)), 1e-8) << "nothing is tested";
+}
+
+TEST(Gauss, is_symplectic) {
+  expect_symplectic(sample::free_se3<Wide>());
+  expect_symplectic(sample::forced_se3<Wide>());
+  expect_symplectic(sample::forced_so3<Wide>());
+  expect_symplectic(sample::forced_se2<Wide>());
+}
+
+TEST(Gauss, is_symplectic_where_the_energy_does_not_separate) {
+  const auto base = sample::forced_se2<Wide>();
+  expect_symplectic(Squared<Of<decltype(base)>>{base});
+}
+
+template <class Method, class System>
+void expect_returns(const System& system) {
+  const auto start = generic_state(system);
+  auto state = stepped<Method>(system, start, 0.05, 100);
+  EXPECT_GT(distance(state, start), 0.1);
+  state = stepped<Method>(system, state, -0.05, 100);
+  EXPECT_LT(distance(state, start), 2e-13);
+}
+
+TEST(Gauss, is_time_reversible_to_rounding) {
+  const auto space = sample::forced_se3();
+  expect_returns<LieMidpoint<Of<decltype(space)>>>(space);
+  expect_returns<hamotor::Gauss4<Of<decltype(space)>>>(space);
+  const auto plane = sample::two_bodies_se2();
+  expect_returns<hamotor::Gauss6<Of<decltype(plane)>>>(plane);
+}
+
+template <class Method, class System>
+double lost_momentum(const System& system) {
+  const auto start = generic_state(system);
+  return distance(spatial_momentum(stepped<Method>(system, start, 0.05, 1000)),
+                  spatial_momentum(start));
+}
+
+TEST(Gauss, keeps_the_spatial_momentum_to_rounding) {
+  const auto free = sample::free_se3();
+  EXPECT_LT(lost_momentum<LieMidpoint<Of<decltype(free)>>>(free), 1e-12);
+  EXPECT_LT(lost_momentum<hamotor::Gauss4<Of<decltype(free)>>>(free), 1e-12);
+  const auto two = sample::two_bodies_se3();
+  EXPECT_LT(lost_momentum<hamotor::Gauss6<Of<decltype(two)>>>(two), 1e-11);
+}
+
+TEST(Gauss, energy_error_does_not_grow) {
+  const auto base = sample::forced_so3();
+  const Squared<Of<decltype(base)>> system{base};
+  const auto worst_within = [&](auto method, int steps) {
+    auto state = generic_state(system);
+    const double before = base.energy(state);
+    double worst = 0;
+    // The time of an autonomous system: its factor is the constant 1.
+    for (int k = 0; k < steps; ++k) {
+      method.do_step(system, state, 0, 0.02);
+      worst = std::max(worst, std::abs(base.energy(state) / before - 1));
+    }
+    return worst;
+  };
+  using System = Of<decltype(system)>;
+  const double early = worst_within(hamotor::Gauss4<System>{}, 2000);
+  const double late = worst_within(hamotor::Gauss4<System>{}, 20000);
+  EXPECT_LT(late, 1.5 * early);
+  EXPECT_LT(late, 1e-4);
+}
+
+TEST(Gauss, gives_no_number_where_the_stages_do_not_converge) {
+  const auto system = sample::forced_se3();
+  auto state = generic_state(system);
+  hamotor::Gauss4<Of<decltype(system)>> method;
+  method.do_step(system, state, 0, 40);
+  EXPECT_TRUE(std::isnan(state.momenta[0].l23));
+}
+
+TEST(Gauss, of_a_body_at_rest_leaves_it_there) {
+  const auto system = sample::free_se3();
+  auto state = generic_state(system);
+  state.momenta[0] = {};
+  const auto start = state;
+  hamotor::Gauss4<Of<decltype(system)>> method;
+  for (int k = 0; k < 3; ++k) method.do_step(system, state, 0, 0.5);
+  EXPECT_LT(distance(state, start), 1e-15);
+}
+
+TEST(Gauss, moves_alike_in_float_and_double) {
+  const auto single = sample::forced_so3<float>();
+  const auto twice = sample::forced_so3();
+  const auto a =
+      stepped<hamotor::Gauss4<Of<decltype(single)>>>(single, generic_state(single), 0.05F, 40);
+  const auto b =
+      stepped<hamotor::Gauss4<Of<decltype(twice)>>>(twice, generic_state(twice), 0.05, 40);
+  EXPECT_LT(distance(a.motors[0].template cast<double>(), b.motors[0]), 2e-5);
+  EXPECT_LT(distance(a.momenta[0].template cast<double>(), b.momenta[0]), 2e-5);
+}
+
+}  // namespace
