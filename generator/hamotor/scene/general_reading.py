@@ -16,7 +16,7 @@ from hamotor.codegen.group import LieGroup
 from hamotor.errors import UsageError, suggest
 from hamotor.mechanics import inertia, interactions
 from hamotor.mechanics.coordinates import Coordinates, Expr
-from hamotor.mechanics.evaluation import momentum_of_rates
+from hamotor.mechanics.evaluation import evaluated, is_real, momentum_of_rates
 from hamotor.mechanics.hamiltonian import Hamiltonian
 from hamotor.mechanics.lagrangian import Lagrangian, NotHyperregular
 from hamotor.mechanics.language import Vector, read_number, read_vector
@@ -31,10 +31,12 @@ from hamotor.scene.general import (
     unit_deviation,
 )
 from hamotor.scene.groups import Group
+from hamotor.scene.invariants import at_the_start
 from hamotor.scene.model import Output, Time
 from hamotor.scene.table import Table, listed, quoted
 
 UNIT_TOLERANCE = 1e-6
+LARGEST_ENERGY = 1e300
 
 MassReader = Callable[[Table], tuple[float, tuple[float, ...], Any]]
 """(mass, centre of mass, tensor about it) of a body's table."""
@@ -156,6 +158,13 @@ def read_general(
     else:
         hamiltonian = Hamiltonian(coordinates, system.energy, system.parameters, applied)
         started = _started(top, drafts, partial(momentum_of_rates, hamiltonian))
+    if lagrangian is None:
+        (energy,) = evaluated([hamiltonian.energy], at_the_start(hamiltonian, started))
+        if not is_real([energy]) or abs(energy) > LARGEST_ENERGY:
+            top.fail(
+                "the energy at the start is no finite number: a body is where H has no value, or"
+                " numbers are too large"
+            )
     return GeneralScene(
         name=name,
         description=top.text("description"),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hamotor.scene.conserved import ConservedQuantity
 
 if TYPE_CHECKING:
     from hamotor.mechanics.evaluation import Values
-    from hamotor.scene.general import GeneralScene
+    from hamotor.mechanics.hamiltonian import Hamiltonian
+    from hamotor.scene.general import GeneralBody, GeneralScene
 
 
 def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]:
@@ -18,7 +20,7 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
     if scene.lagrangian is not None:
         return (_of_newton(scene),)
     group = scene.group
-    start = _at_the_start(scene)
+    start = at_the_start(scene.hamiltonian, scene.bodies)
 
     def measure(quantity: Conserved) -> tuple[tuple[str, ...], float]:
         """`norm` and `scale`: of a sum that cancels at the start, that of its terms."""
@@ -61,19 +63,6 @@ CANCELLED = 1e-9
 """A sum is near zero if it is less than so much of its terms."""
 
 
-def _at_the_start(scene: GeneralScene) -> Values:
-    """What every symbol of H is at the start, as mpmath numbers."""
-    import mpmath
-
-    from hamotor.mechanics.evaluation import place, values_of
-
-    known = values_of(scene.hamiltonian.parameters)
-    for body in scene.bodies:
-        known = place(body.coordinates, body.motor, known)
-        known |= dict(zip(body.coordinates.momenta, map(mpmath.mpf, body.momentum), strict=True))
-    return known
-
-
 def _size(total: Any, known: Values) -> tuple[float, float]:
     """A sum's value, and the sum of its terms' magnitudes."""
     import sympy
@@ -82,3 +71,16 @@ def _size(total: Any, known: Values) -> tuple[float, float]:
 
     terms = evaluated(sympy.Add.make_args(total), known)
     return float(sum(terms)), float(sum(map(abs, terms)))
+
+
+def at_the_start(hamiltonian: Hamiltonian, bodies: Sequence[GeneralBody]) -> Values:
+    """What every symbol of H is at the start, as mpmath numbers."""
+    import mpmath
+
+    from hamotor.mechanics.evaluation import place, values_of
+
+    known = values_of(hamiltonian.parameters)
+    for body in bodies:
+        known = place(body.coordinates, body.motor, known)
+        known |= dict(zip(body.coordinates.momenta, map(mpmath.mpf, body.momentum), strict=True))
+    return known
