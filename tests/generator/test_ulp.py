@@ -85,7 +85,16 @@ def test_a_measurement_fits_only_without_nan_and_within_the_bound() -> None:
 
 
 def expect_within_bounds(found: list[conditioned.KernelMeasurement]) -> None:
-    wrong = [m for m in found if not m.fits and not conditioned.excepted(m)]
+    """The bound, or what the table says where that is more: the same points, but fewer."""
+    published = conditioned.published(TABLE.read_text(encoding="utf-8"))
+
+    def fits(m: conditioned.KernelMeasurement) -> bool:
+        if m.fits or not conditioned.excepted(m):
+            return m.fits
+        largest = 1.01 * published[m.kernel.name, m.algebra, m.scalar]  # of three digits
+        return m.max_ulp <= max(m.bound, largest) and m.nan <= m.points / 50
+
+    wrong = [m for m in found if not fits(m)]
     assert not wrong, "\n".join(f"{m.title} {m.scalar}: {m.max_ulp}, {m.nan} nan" for m in wrong)
 
 

@@ -141,22 +141,35 @@ class Sampler {
   Numbers bivector(const Element& element) {
     const std::vector<int> planes = bivector_blades(element);
     std::vector<Quad> b(static_cast<std::size_t>(algebra_.blades));
-    const std::size_t kind = random_.below(8);
-    const double scale = random_.power_of_ten(-9, 1.3);
-    if (kind < 3) {
+    const std::size_t kind = random_.below(9);
+    const double scale = random_.power_of_ten(-9, 3);
+    if (kind == 8 && boosting_) {
+      // two null blades that turn together, and a plane that commutes with both
+      Entry pair = algebra_.product[0];
+      while (!is_boost(pair, planes))
+        pair = algebra_.product[random_.below(algebra_.product.size())];
+      const Quad a = random_.below(2) ? Quad(angle()) : Quad(random_.symmetric() * scale);
+      const double weight = random_.power_of_ten(-2, 2);
+      b[index(pair.a)] = a * weight / M_SQRT2q;
+      b[index(pair.b)] = -pair.coefficient * a / weight / M_SQRT2q;
+      const double apart = random_.below(3) ? random_.power_of_ten(-17, 0) : 0.0;
+      for (const int other : planes)
+        if ((other & (pair.a | pair.b)) == 0) b[index(other)] = a * (Quad(1) + apart);
+    } else if (kind < 3) {
       for (const int blade : planes) b[index(blade)] = some_size(blade, scale);
       return read(element, b);
-    }
-    const int first = planes[random_.below(planes.size())];
-    const int second = planes[random_.below(planes.size())];
-    const Quad a = kind < 6 ? some_size(first, scale) : Quad(angle());
-    b[index(first)] += a;
-    if ((first & second) == 0) {
-      const double apart = random_.below(3) ? random_.power_of_ten(-17, 0) : 0.0;
-      const Quad other = a * random_.sign() * (Quad(1) + apart);
-      b[index(second)] += random_.below(4) ? other : some_size(second, scale);
-    } else if (random_.below(2)) {
-      b[index(second)] += random_.below(2) ? a * random_.sign() : some_size(second, scale);
+    } else {
+      const int first = planes[random_.below(planes.size())];
+      const int second = planes[random_.below(planes.size())];
+      const Quad a = kind < 6 ? some_size(first, scale) : Quad(angle());
+      b[index(first)] += a;
+      if ((first & second) == 0) {
+        const double apart = random_.below(3) ? random_.power_of_ten(-17, 0) : 0.0;
+        const Quad other = a * random_.sign() * (Quad(1) + apart);
+        b[index(second)] += random_.below(4) ? other : some_size(second, scale);
+      } else if (random_.below(2)) {
+        b[index(second)] += random_.below(2) ? a * random_.sign() : some_size(second, scale);
+      }
     }
     std::vector<Quad> turn = factor(planes);
     turn = times(turn, factor(planes));
@@ -181,13 +194,15 @@ class Sampler {
     std::vector<int> found;
     for (const Part& part : element.embedding)
       if (algebra_.grades[index(part.blade)] == 2) found.push_back(part.blade);
-    boosting_ = false;
-    for (const Entry& e : algebra_.product) {
-      const bool both = std::count(found.begin(), found.end(), e.a) > 0 &&
-                        std::count(found.begin(), found.end(), e.b) > 0;
-      boosting_ = boosting_ || (both && e.a != e.b && e.c == 0);
-    }
+    boosting_ = std::any_of(algebra_.product.begin(), algebra_.product.end(),
+                            [&](const Entry& e) { return is_boost(e, found); });
     return found;
+  }
+
+  // Of two different blades whose product has a number in it.
+  static bool is_boost(const Entry& e, const std::vector<int>& blades) {
+    return e.a != e.b && e.c == 0 && std::count(blades.begin(), blades.end(), e.a) > 0 &&
+           std::count(blades.begin(), blades.end(), e.b) > 0;
   }
 
   double angle() {

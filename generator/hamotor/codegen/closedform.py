@@ -202,6 +202,13 @@ def exp_kernel(
         arguments: tuple[Expression, ...] = (w, planes.plus, planes.minus)
     else:
         arguments = (polynomial_expression(parts.number), polynomial_expression(parts.omega))
+        omega = poly.apply_bilinear(algebra.geometric, parts.quad, parts.quad).get(0, {})
+        if any(x > 0 for x in omega.values()):
+            twisted = {
+                blade: writer.let_polynomial(f"t_{algebra.blade_name(blade)}", p)
+                for blade, p in twisted.items()
+            }
+            arguments += _nearly_isoclinic(algebra, writer, b, parts, twisted)
     writer.let("e", Call("bivector_exponential", arguments))
     out: dict[Blade, Expression] = {0: Name("e.number")}
     terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("e.bivector"), b)]
@@ -212,6 +219,34 @@ def exp_kernel(
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Any bivector: two commuting rotations or boosts, isoclinic, simple or null.",)
     return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, notes)
+
+
+def _nearly_isoclinic(
+    algebra: Algebra,
+    writer: Writer,
+    b: PolynomialMultivector,
+    parts: Square,
+    twisted: PolynomialMultivector,
+) -> tuple[Expression, Expression]:
+    """√ω, and the one of S ± √ω that nearly vanishes where planes are nearly isoclinic.
+
+    That is ½ <U²>₀ with U = B ± <B W>₂ / √ω, which cancels before it is squared, not after.
+    """
+    s, omega = (polynomial_expression(p) for p in (parts.number, parts.omega))
+    root = writer.let("root", Call("sqrt", (omega,)))
+    isoclinic = MultiplyAdd(Product(number(Fraction(-1, 4)), s), s, omega)
+    side = Select(s, number(-parts.content), number(parts.content))
+    share = writer.let("share", Select(isoclinic, Quotient(side, root), number(0)))
+    cancelled: PolynomialMultivector = {}
+    for blade, p in b.items():
+        part = MultiplyAdd(
+            share, polynomial_expression(twisted.get(blade, {})), polynomial_expression(p)
+        )
+        name = f"u_{algebra.blade_name(blade)}"
+        writer.let(name, part if blade in twisted else polynomial_expression(p))
+        cancelled[blade] = {(name,): 1}
+    square = poly.apply_bilinear(algebra.geometric, cancelled, cancelled)[0]
+    return root, polynomial_expression(poly.scaled(square, ratio(1, 2)))
 
 
 def log_kernel(

@@ -133,4 +133,15 @@ template <class S>
   return detail::plane_exponential(s, omega, sqrt(plus * minus));
 }
 
+/// The same with √ω and, where ω > S²/4, with S + √ω (for S > 0: S − √ω) without cancellation.
+template <class S>
+[[nodiscard]] BivectorExponential<S> bivector_exponential(const S& s, const S& omega, const S& root,
+                                                          const S& near) noexcept {
+  if (omega > S(0.25) * (s * s) && abs(s) + root > S(1)) {
+    if (s > S(0)) return detail::isoclinic_exponential(s + root, near, root);
+    return detail::isoclinic_exponential(near, s - root, root);
+  }
+  return bivector_exponential(s, omega);
+}
+
 }  // namespace hamotor::scalar
