@@ -166,7 +166,8 @@ class Sampler {
       if ((first & second) == 0) {
         const double apart = random_.below(3) ? random_.power_of_ten(-17, 0) : 0.0;
         const Quad other = a * random_.sign() * (Quad(1) + apart);
-        b[index(second)] += random_.below(4) ? other : some_size(second, scale);
+        const bool boundless = algebra_.squares[index(second)] > 0 && fabsq(a) > 20;
+        b[index(second)] += random_.below(4) && !boundless ? other : some_size(second, scale);
       } else if (random_.below(2)) {
         b[index(second)] += random_.below(2) ? a * random_.sign() : some_size(second, scale);
       }
