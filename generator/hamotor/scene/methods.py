@@ -34,6 +34,7 @@ ANY = Form.SPLIT | Form.GENERAL
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
+    Method("rkmk54", 5, "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit", ANY),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
     Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
     Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),

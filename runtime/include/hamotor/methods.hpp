@@ -3,6 +3,7 @@
 
 #include <tuple>
 
+#include "hamotor/adaptive.hpp"
 #include "hamotor/gauss.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
@@ -13,14 +14,15 @@ namespace detail {
 
 template <class System>
 struct Steppers {
-  using type = std::tuple<Rkmk4<System>, Rk4<System>, LieMidpoint<System>, Gauss4<System>,
-                          Gauss6<System>, Gauss8<System>>;
+  using type = std::tuple<Rkmk4<System>, Rkmk54<System>, Rk4<System>, LieMidpoint<System>,
+                          Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 template <SplitSystem System>
 struct Steppers<System> {
-  using type = std::tuple<Rkmk4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
-                          Splitting6<System>, Splitting8<System>, Splitting10<System>,
-                          LieMidpoint<System>, Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+  using type =
+      std::tuple<Rkmk4<System>, Rkmk54<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
+                 Splitting6<System>, Splitting8<System>, Splitting10<System>, LieMidpoint<System>,
+                 Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 
 }  // namespace detail
