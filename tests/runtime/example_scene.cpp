@@ -123,7 +123,8 @@ TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
     std::array<double, 2> drift{};
     hamotor_drift(run, drift.data());
     EXPECT_GT(drift[1], 0);
-    EXPECT_LT(drift[0], 1e-14);
+    // Steps of rk4 leave the group by an error of the method, all others by rounding.
+    EXPECT_LT(drift[0], std::string_view(method) == "rk4" ? 1e-10 : 1e-14);
     hamotor_stop(run);
   }
 }
