@@ -19,10 +19,12 @@ from typing import TYPE_CHECKING, Any
 from hamotor.errors import HamotorError, NumericsError, ToolError, UsageError
 
 if TYPE_CHECKING:
+    from hamotor.mechanics import language
     from hamotor.run.comparison import Comparison, compare
     from hamotor.run.dataset import read_trajectory
     from hamotor.run.result import Run, RunFailed, RunInterrupted, open_run
-    from hamotor.run.simulation import Simulation, load
+    from hamotor.run.simulation import Simulation, from_hamiltonian, load
+    from hamotor.scene.building import body
 
 __version__ = "0.1.0"
 
@@ -37,6 +39,8 @@ _HOMES = {
     "open_run": "hamotor.run.result",
     "Simulation": "hamotor.run.simulation",
     "load": "hamotor.run.simulation",
+    "from_hamiltonian": "hamotor.run.simulation",
+    "body": "hamotor.scene.building",
 }
 
 __all__ = [
@@ -50,7 +54,10 @@ __all__ = [
     "ToolError",
     "UsageError",
     "__version__",
+    "body",
     "compare",
+    "from_hamiltonian",
+    "language",
     "load",
     "open_run",
     "read_trajectory",
@@ -58,6 +65,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "language":
+        from hamotor.mechanics import language
+
+        return language
     if name not in _HOMES:
         raise AttributeError(f"module 'hamotor' has no attribute {name!r}")
     from importlib import import_module

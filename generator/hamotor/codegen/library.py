@@ -84,7 +84,7 @@ def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
         kernels += unit_kernels(spec.algebra, element)
     for group in spec.groups:
         kernels += group_kernels(spec, group)
-    return tuple(kernels)
+    return tuple(replace(kernel, program=kernel.program.without_unused()) for kernel in kernels)
 
 
 def stepping_requests(spec: AlgebraSpec) -> tuple[Request, ...]:

@@ -7,7 +7,7 @@ text, the polynomial it stands for (`expand`) and numbers in any arithmetic (`ev
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hamotor.codegen.algebra import Rational, magnitude
@@ -178,6 +178,24 @@ class Program:
                 total = total + _node_cost(node)
             total = total + Cost(fused=-_split_sums(expression))
         return total
+
+    def without_unused(self) -> Program:
+        """The same outputs without the bindings that they do not need."""
+        needed: set[str] = set()
+        kept: list[tuple[str, Expression]] = []
+
+        def read(expression: Expression) -> None:
+            for node in walk(expression):
+                if isinstance(node, Name):
+                    needed.add(node.text.split(".")[0])
+
+        for _, expression in self.outputs:
+            read(expression)
+        for name, expression in reversed(self.bindings):
+            if name in needed:
+                kept.append((name, expression))
+                read(expression)
+        return replace(self, bindings=tuple(reversed(kept)))
 
     def nodes(self) -> Iterator[Expression]:
         """Every expression in the program."""

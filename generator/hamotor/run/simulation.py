@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -24,6 +24,7 @@ from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, meet_
 
 if TYPE_CHECKING:
     from hamotor.scene import GeneralScene, Scene
+    from hamotor.scene.building import BodyWords
 
 SCALARS = ("double", "float", "long_double")
 KERNELS = ("generated", "generic")
@@ -335,6 +336,29 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         source=source,
         read=read,
         matrix_source=in_matrices,
+    )
+
+
+def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) -> Simulation:
+    """A Hamiltonian made in Python, ready to run; see `hamotor.scene.building.general_scene`."""
+    from hamotor.scene import Form, methods_offered, scene_source
+    from hamotor.scene.building import general_scene
+    from hamotor.scene.matrix_source import matrix_source
+
+    scene = general_scene(energy, bodies, **settings)
+    return Simulation(
+        name=scene.name,
+        source=lambda *choice: scene_source(scene, *choice),
+        state=scene.initial_state,
+        end=scene.time.end,
+        step=scene.time.step,
+        tolerance=None,
+        method=scene.time.method,
+        every=scene.output.every,
+        spec_hash=scene.sha256,
+        methods=methods_offered(Form.GENERAL),
+        read=lambda: scene,
+        matrix_source=lambda scalar: matrix_source(scene, scalar),
     )
 
 
