@@ -48,6 +48,7 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
             quantity.expression if quantity.kind == "own" else None,
         )
         for quantity in conserved(scene.hamiltonian, scene.system)
+        if quantity.kind != "own" or _has_a_value(quantity.expression, start)
     )
 
 
@@ -61,6 +62,13 @@ def _of_newton(scene: GeneralScene) -> tuple[ConservedQuantity, None]:
 
 CANCELLED = 1e-9
 """A sum is near zero if it is less than so much of its terms."""
+
+
+def _has_a_value(own: Any, known: Values) -> bool:
+    """A quotient of momenta has none where they vanish."""
+    from hamotor.mechanics.evaluation import evaluated, is_real
+
+    return is_real(evaluated([own], known))
 
 
 def _size(total: Any, known: Values) -> tuple[float, float]:
