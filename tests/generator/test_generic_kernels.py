@@ -15,6 +15,7 @@ from hamotor.scene import bundled_scenes
 
 BUNDLED = [name for name, _ in bundled_scenes()]
 STEPS = 20
+ORBITING = "gravity_gradient"
 
 
 def agree_in(simulation: hamotor.Simulation, scalar: str, *methods: str) -> None:
@@ -39,19 +40,21 @@ def agree_in(simulation: hamotor.Simulation, scalar: str, *methods: str) -> None
 
 
 def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: float) -> None:
-    """To rounding of the largest number that has the same unit."""
+    """To rounding of the largest number that has the same unit, and in orbit to that of P × V."""
     columns = libraries[0].description.columns
     assert columns == libraries[1].description.columns
     assert [library.description.kernels for library in libraries] == ["generated", "generic"]
     for k, column in enumerate(columns):
         alike = [row[n] for row in found for n, c in enumerate(columns) if c.unit == column.unit]
         size = max(1e-9, float(np.max(np.abs(alike))))
-        assert abs(found[0][k] - found[1][k]) <= 64 * STEPS * rounding * size, column.name
+        lost = 1e5 if libraries[0].description.scene == ORBITING else 1
+        assert abs(found[0][k] - found[1][k]) <= 64 * STEPS * rounding * size * lost, column.name
 
 
 @pytest.mark.parametrize("name", BUNDLED)
 def test_bundled_scenes_move_alike(name: str) -> None:
-    agree_in(hamotor.load(name), "double", "rkmk4")
+    # In orbit P × V is the difference of products of 1e10 N m, ten digits more than any torque.
+    agree_in(hamotor.load(name), "long_double" if name == ORBITING else "double", "rkmk4")
 
 
 @pytest.mark.parametrize(("algebra", "group"), GROUPS)

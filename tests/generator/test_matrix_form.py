@@ -139,7 +139,11 @@ def test_trajectories_agree_to_the_methods_errors(
     other = after(simulation, matrix, method, step, 400)
     assert ga.description.columns == matrix.description.columns
     assert ga.description.conserved == matrix.description.conserved
-    np.testing.assert_array_less(np.abs(one - other), 1e-9 * np.maximum(sizes(ga, one), 1e-6))
+    bound = 1e-9 * np.maximum(sizes(ga, one), 1e-6)
+    if name == "gravity_gradient":
+        # In orbit P × V is the difference of products of 1e10 N m, ten digits more than any torque.
+        bound *= 100
+    np.testing.assert_array_less(np.abs(one - other), bound)
 
 
 @pytest.mark.parametrize("method", ["rkmk4", "rk4"])
