@@ -85,9 +85,9 @@ class Rkmk54 {
       const S then = mul_add(node, h, t);
       const auto now = gradient(system, there, then);
       if constexpr (PoweredSystem<System>) powers[s] = system.power(there, then);
+      forces[s] = free_momentum_rates(system, there.momenta, now.rates);
       for (std::size_t i = 0; i < n; ++i) {
         slopes[s][i] = dexp_inverse(x[i], now.rates[i]);
-        forces[s][i] = coadjoint(now.rates[i], there.momenta[i]);
         if constexpr (System::has_forque) forces[s][i] = forces[s][i] - now.forques[i];
       }
     }

@@ -126,6 +126,21 @@ template <HamiltonianSystem System>
   }
 }
 
+/// [μ, B] for every body at these rates; a system may know better what of it cancels.
+template <HamiltonianSystem System>
+[[nodiscard]] constexpr auto free_momentum_rates(
+    const System& system, const decltype(StateOf<System>::momenta)& momenta,
+    const std::array<typename System::Group::template Rate<typename System::Scalar>,
+                     System::bodies>& rates) noexcept {
+  if constexpr (requires { system.free_momentum_rates(momenta); }) {
+    return system.free_momentum_rates(momenta);
+  } else {
+    auto result = momenta;
+    for (std::size_t i = 0; i < System::bodies; ++i) result[i] = coadjoint(rates[i], momenta[i]);
+    return result;
+  }
+}
+
 /// H at a state and a time, J.
 template <HamiltonianSystem System>
 [[nodiscard]] constexpr typename System::Scalar energy(const System& system,

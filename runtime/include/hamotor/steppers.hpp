@@ -170,8 +170,8 @@ class Rkmk4 {
                                              const S& t, const Rates& x) noexcept {
     const auto now = gradient(system, state, t);
     Slope result{};
+    result.force = free_momentum_rates(system, state.momenta, now.rates);
     for (std::size_t i = 0; i < n; ++i) {
-      result.force[i] = coadjoint(now.rates[i], state.momenta[i]);
       result.rate[i] = detail::dexp_inverse(x[i], now.rates[i], S(0.5));
       if constexpr (System::has_forque) result.force[i] = result.force[i] - now.forques[i];
     }
@@ -270,9 +270,9 @@ class Rk4 {
                                              const S& t) noexcept {
     const auto now = gradient(system, state, t);
     Slope result{};
+    result.force = free_momentum_rates(system, state.momenta, now.rates);
     for (std::size_t i = 0; i < n; ++i) {
       result.motors[i] = kinematics(state.motors[i], now.rates[i]);
-      result.force[i] = coadjoint(now.rates[i], state.momenta[i]);
       if constexpr (System::has_forque) result.force[i] = result.force[i] - now.forques[i];
     }
     if constexpr (PoweredSystem<System>) result.power = system.power(state, t);

@@ -288,6 +288,13 @@ class FreeBody {
         detail::joined(rotation_.rate(detail::first<rotations>(x)), velocity(x, inverse_mass_)));
   }
 
+  /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out: in orbit it
+  /// is the difference of products that are larger than any torque by all digits.
+  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
+    const auto turning = detail::first<rotations>(rate(mu).components());
+    return coadjoint(Rate::from(detail::joined(turning, std::array<S, dimension>{})), mu);
+  }
+
   /// ½ μ(B), J.
   [[nodiscard]] constexpr S kinetic(const Momentum& mu) const noexcept {
     const auto x = mu.components();
@@ -385,6 +392,11 @@ class PivotedBody {
   /// B = ∂T/∂μ: Ω = Π/J.
   [[nodiscard]] constexpr Rate rate(const Momentum& mu) const noexcept {
     return Rate::from(rotation_.rate(mu.components()));
+  }
+
+  /// [μ, B] for B = ∂T/∂μ: Π×Ω.
+  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
+    return coadjoint(rate(mu), mu);
   }
 
   /// ½ μ(B), J.
@@ -633,6 +645,13 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   [[nodiscard]] constexpr Rates rate(const State& state) const noexcept {
     Rates result{};
     for_each_body([&](auto i, const auto& one) { result[i] = one.rate(state.momenta[i]); });
+    return result;
+  }
+
+  /// [μ, B] for every body, body frame.
+  [[nodiscard]] constexpr Momenta free_momentum_rates(const Momenta& momenta) const noexcept {
+    Momenta result{};
+    for_each_body([&](auto i, const auto& one) { result[i] = one.free_momentum_rate(momenta[i]); });
     return result;
   }
 
