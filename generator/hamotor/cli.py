@@ -169,7 +169,11 @@ def _parser() -> _Parser:
         help="exit with 1 if any difference, in its unit, is above E",
     )
     test = command("test", "run all checks and tests", _test)
-    test.add_argument("--fast", action="store_true", help="leave out what takes long")
+    extent = test.add_mutually_exclusive_group()
+    extent.add_argument("--fast", action="store_true", help="leave out what is slow")
+    extent.add_argument(
+        "--long", action="store_true", help="also what takes too long for every change"
+    )
     test.add_argument(
         "--with-peers",
         action="store_true",
@@ -537,7 +541,7 @@ def _compare(parsed: argparse.Namespace) -> int:
 def _test(parsed: argparse.Namespace) -> int:
     from hamotor.testing import run_tests
 
-    return run_tests(fast=parsed.fast, with_peers=parsed.with_peers)
+    return run_tests(parsed.fast, parsed.with_peers, parsed.long)
 
 
 def _bench(parsed: argparse.Namespace) -> int:

@@ -42,8 +42,11 @@ INSTALL_PEERS: Final = Check(
 )
 
 
-def checks(fast: bool) -> list[Check]:
-    """The checks in the order they run; `fast` leaves out clang and the tests marked slow."""
+def checks(fast: bool, long: bool = False) -> list[Check]:
+    """The checks in the order they run.
+
+    fast: without clang and the tests marked slow.  long: with the tests marked long.
+    """
     listed = [
         Check("ruff check", (_module("ruff", "check", "."),)),
         Check("ruff format", (_module("ruff", "format", "--check", "."),)),
@@ -54,19 +57,21 @@ def checks(fast: bool) -> list[Check]:
     ]
     if not fast:
         listed.append(_cpp_tests("clang"))
-    chosen = ("-m", "not slow") if fast else ()
+    left_out = "not slow and not long" if fast else "" if long else "not long"
+    chosen = ("-m", left_out) if left_out else ()
     listed.append(Check("pytest", (_module("pytest", "--numprocesses=auto", *chosen),)))
     return listed
 
 
-def run_tests(fast: bool, with_peers: bool = False) -> int:
+def run_tests(fast: bool, with_peers: bool = False, long: bool = False) -> int:
     """Run every check, whatever the ones before it did; 0 if all passed, 1 if any failed.
 
+    fast, long: less or more than what continuous integration runs.
     with_peers: first install the libraries that kernels are compared with; tests that find none of
     them are skipped, and say so.
     Raises ToolError before anything runs if a tool is missing.
     """
-    chosen = [*([INSTALL_PEERS] if with_peers else []), *checks(fast)]
+    chosen = [*([INSTALL_PEERS] if with_peers else []), *checks(fast, long)]
     _require_tools(chosen)
     _forget_moved_builds()
     outcomes = [_run(check) for check in chosen]

@@ -13,7 +13,13 @@ from hamotor.codegen.spec import bundled_algebra
 from hamotor.run.library import SceneLibrary
 from hamotor.scene import bundled_scenes
 
-BUNDLED = [name for name, _ in bundled_scenes()]
+OFTEN = {"heavy_top", "spring_pendulum", "breathing_body", "rocket", "two_bodies"}
+OFTEN |= {"SE3", "Sim3", "SE4", "SO13", "SE2"}
+"""Compiled for every change; the others only when asked for."""
+BUNDLED = [
+    pytest.param(name, marks=() if name in OFTEN else pytest.mark.long)
+    for name, _ in bundled_scenes()
+]
 STEPS = 20
 ORBITING = "gravity_gradient"
 
@@ -57,7 +63,10 @@ def test_bundled_scenes_move_alike(name: str) -> None:
     agree_in(hamotor.load(name), "long_double" if name == ORBITING else "double", "rkmk4")
 
 
-@pytest.mark.parametrize(("algebra", "group"), GROUPS)
+@pytest.mark.parametrize(
+    ("algebra", "group"),
+    [pytest.param(*g, marks=() if g[1] in OFTEN else pytest.mark.long) for g in GROUPS],
+)
 def test_every_group_moves_alike(algebra: str, group: str, tmp_path: Path) -> None:
     generators = [
         g.name

@@ -17,8 +17,10 @@ from hamotor.run.library import SceneLibrary
 from hamotor.scene import bundled_scenes, parse_scene
 from hamotor.scene.matrix_source import matrix_source
 
+OFTEN = {"heavy_top", "spring_pendulum", "conformal_pendulum", "kirchhoff", "rocket"}
+"""Compiled for every change; the other scenes only when asked for."""
 BUNDLED = [
-    name
+    pytest.param(name, marks=() if name in OFTEN else pytest.mark.long)
     for name, _ in bundled_scenes()
     if hamotor.load(name).read().group.name in ("SE3", "SO3", "SE2")  # type: ignore[misc]
 ]

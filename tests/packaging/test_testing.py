@@ -22,7 +22,7 @@ def test_a_failure_does_not_stop_the_checks_after_it(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     listed = [Check("fails", FAILS.commands[:1]), PASSES]
-    monkeypatch.setattr(testing, "checks", lambda _fast: listed)
+    monkeypatch.setattr(testing, "checks", lambda *_: listed)
     assert testing.run_tests(fast=False) == 1
     said = capfd.readouterr().out
     assert "it ran" in said
@@ -30,14 +30,14 @@ def test_a_failure_does_not_stop_the_checks_after_it(
 
 
 def test_all_passed_is_zero_and_nobody_waits_for_input(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(testing, "checks", lambda _fast: [PASSES, READS])
+    monkeypatch.setattr(testing, "checks", lambda *_: [PASSES, READS])
     assert testing.run_tests(fast=False) == 0
 
 
 def test_a_missing_tool_is_named_before_anything_runs(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(testing, "checks", lambda _fast: [PASSES, FAILS])
+    monkeypatch.setattr(testing, "checks", lambda *_: [PASSES, FAILS])
     with pytest.raises(ToolError, match="no such command: never"):
         testing.run_tests(fast=False)
     assert "it ran" not in capfd.readouterr().out
@@ -55,7 +55,12 @@ def test_fast_leaves_out_clang_and_slow_tests() -> None:
     all_names = [check.name for check in testing.checks(fast=False)]
     fast = testing.checks(fast=True)
     assert set(all_names) - {check.name for check in fast} == {"C++ tests, clang"}
-    assert "not slow" in fast[-1].commands[-1]
+    assert "not slow and not long" in fast[-1].commands[-1]
+
+
+def test_tests_marked_long_run_only_when_asked_for() -> None:
+    assert "not long" in testing.checks(fast=False)[-1].commands[-1]
+    assert "-m" not in testing.checks(fast=False, long=True)[-1].commands[-1][4:]
 
 
 def test_every_compiler_has_its_presets() -> None:
@@ -69,7 +74,7 @@ def test_a_build_folder_of_another_place_is_forgotten(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(testing, "ROOT", tmp_path)
-    monkeypatch.setattr(testing, "checks", lambda _fast: [PASSES])
+    monkeypatch.setattr(testing, "checks", lambda *_: [PASSES])
     for name, home in (("moved", "/elsewhere"), ("kept", tmp_path)):
         cache = tmp_path / ".hamotor" / "build" / name / "CMakeCache.txt"
         cache.parent.mkdir(parents=True)
