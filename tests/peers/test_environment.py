@@ -39,7 +39,7 @@ def test_the_option_installs_peers_before_any_other_check(monkeypatch: pytest.Mo
         return Outcome(check, None, 0.0)
 
     monkeypatch.setattr(testing, "_run", run)
-    monkeypatch.setattr(testing, "checks", lambda _fast: [Check("the rest", ())])
+    monkeypatch.setattr(testing, "checks", lambda *_: [Check("the rest", ())])
     assert testing.run_tests(fast=True, with_peers=True) == 0
     assert testing.run_tests(fast=True) == 0
     assert [check.name for check in ran] == [
