@@ -279,15 +279,17 @@ def test_compare_exits_with_1_above_the_tolerance(
 def test_test_runs_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 
-    def run_tests(fast: bool, with_peers: bool) -> int:
-        calls.append((fast, with_peers))
+    def run_tests(fast: bool, with_peers: bool, long: bool) -> int:
+        calls.append((fast, with_peers, long))
         return 1
 
     monkeypatch.setattr(testing, "run_tests", run_tests)
     assert main(["test"]) == 1
     assert main(["test", "--fast"]) == 1
     assert main(["test", "--with-peers"]) == 1
-    assert calls == [(False, False), (True, False), (False, True)]
+    assert main(["test", "--long"]) == 1
+    assert [sum(call) for call in calls] == [0, 1, 1, 1]
+    assert [call.index(True) for call in calls[1:]] == [0, 1, 2]
 
 
 def test_a_closed_pipe_is_no_error() -> None:
