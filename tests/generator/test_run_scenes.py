@@ -154,6 +154,8 @@ def test_a_scene_is_compiled_with_the_one_method_it_is_run_with() -> None:
     simulation = hamotor.load("heavy_top")
     compiled = simulation.compile(method="splitting6")
     assert compiled.description.methods == simulation.methods, "the runtime and the list agree"
+    chosen = {m.name for m in METHODS if m.error_controlled and m.forms & Form.SPLIT}
+    assert compiled.description.error_controlled == chosen
     state = simulation.state
     with compiled.library.start("splitting6", step=0.01, state=state) as live:
         assert live.advance(3, 1, None) == 3

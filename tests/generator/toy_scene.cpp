@@ -21,7 +21,7 @@
 #define SLEEP_US 0
 #endif
 #ifndef ABI
-#define ABI "1"
+#define ABI "2"
 #endif
 
 #define EXPORT extern "C" __attribute__((visibility("default")))
@@ -84,7 +84,7 @@ void write_row(const Run& run, double* row) {
 EXPORT const char* hamotor_describe() {
   return R"({"abi": )" ABI R"(, "scene": "toy", "algebra": "pga3", "group": "SE3",
  "scalar": "double", "kernels": "generated", "compiler": "toy", "fma": false, "bodies": ["bob"],
- "methods": [{"name": "splitting2", "order": 2}, {"name": "euler", "order": 1}],
+ "methods": [{"name": "splitting2", "order": 2, "error_controlled": false}, {"name": "euler", "order": 1, "error_controlled": false}],
  "motor": ["s","e23","e31","e12","e01","e02","e03","e0123"],
  "momentum": ["e23","e31","e12","e01","e02","e03"],
  "columns": [{"name":"t","unit":"s","frame":"","body":""},
@@ -115,7 +115,8 @@ EXPORT const char* hamotor_describe() {
    "norm":["spatial_momentum.e02"],"scale":0}]})";
 }
 
-EXPORT void* hamotor_start(const char* method, double time, double step, const double* state) {
+EXPORT void* hamotor_start(const char* method, double time, double step, double,
+                           const double* state) {
   const bool leapfrog = std::strcmp(method, "splitting2") == 0;
   if (!leapfrog && std::strcmp(method, "euler") != 0) return nullptr;
   const double s = state[0], e12 = state[3];
@@ -158,6 +159,15 @@ EXPORT void hamotor_state(const void* handle, double* state) {
 EXPORT void hamotor_drift(const void* handle, double* drift) {
   drift[0] = 1e-16;
   drift[1] = 1e-16 * static_cast<double>(static_cast<const Run*>(handle)->index);
+}
+
+EXPORT std::int64_t hamotor_steps(const void* handle) {
+  return static_cast<const Run*>(handle)->index;
+}
+
+EXPORT std::int32_t hamotor_failure(const void* handle, std::int64_t* component) {
+  *component = -1;
+  return static_cast<const Run*>(handle)->index + 1 == FAIL_AT ? 1 : 0;
 }
 
 EXPORT void hamotor_stop(void* handle) { delete static_cast<Run*>(handle); }

@@ -79,6 +79,37 @@ TEST(Adaptive, errors_follow_the_tolerance) {
   expect_tolerance_met(sample::two_bodies_se2());
 }
 
+TEST(Adaptive, is_the_method_itself_without_a_tolerance) {
+  const auto system = sample::forced_se3();
+  using System = Of<decltype(system)>;
+  static_assert(hamotor::ErrorControlled<Adaptive<System>, double>);
+  static_assert(!hamotor::ErrorControlled<Rkmk54<System>, double>);
+  auto one = generic_state(system);
+  auto other = one;
+  Adaptive<System> method;
+  Rkmk54<System> plain;
+  for (int k = 0; k < 3; ++k) {
+    method.do_step(system, one, 0.1 * k, 0.1);
+    plain.do_step(system, other, 0.1 * k, 0.1);
+  }
+  EXPECT_EQ(one, other);
+  EXPECT_EQ(method.steps(), 3);
+}
+
+TEST(Adaptive, remembers_its_step_from_call_to_call) {
+  const auto system = sample::forced_se3();
+  Adaptive<Of<decltype(system)>> method(1e-9);
+  auto state = generic_state(system);
+  method.do_step(system, state, 0, 1);
+  const long long taken = method.steps();
+  const long long refused = method.tried() - taken;
+  method.do_step(system, state, 1, 1);
+  EXPECT_GT(taken, 10);
+  EXPECT_LE(method.tried() - method.steps(), refused + 2);
+  EXPECT_NEAR(static_cast<double>(method.steps()), 2.0 * static_cast<double>(taken),
+              0.3 * static_cast<double>(taken));
+}
+
 TEST(Adaptive, runs_backwards) {
   const auto system = sample::forced_se3();
   const auto start = generic_state(system);
@@ -96,6 +127,7 @@ TEST(Adaptive, gives_no_number_for_a_tolerance_below_rounding) {
   Adaptive<Of<decltype(system)>> method(1e-25);
   method.do_step(system, state, 0, 1);
   EXPECT_TRUE(std::isnan(state.momenta[0].l23));
+  EXPECT_EQ(method.failure(), hamotor::Failure::step_too_short);
 }
 
 }  // namespace

@@ -82,17 +82,17 @@ TEST(ExampleScene, describes_every_column_it_writes) {
     ++described;
   }
   EXPECT_EQ(described, std::tuple_size_v<Row>);
-  EXPECT_NE(text.find("{\"name\": \"splitting2\", \"order\": 2}"), std::string::npos);
+  EXPECT_NE(text.find("{\"name\": \"splitting2\", \"order\": 2, "), std::string::npos);
   EXPECT_NE(text.find("\"brick.motor.e0123\", \"unit\": \"m\""), std::string::npos);
 }
 
 TEST(ExampleScene, unknown_method_starts_nothing) {
-  EXPECT_EQ(hamotor_start("euler", 0, 0.01, start.data()), nullptr);
-  EXPECT_EQ(hamotor_start(nullptr, 0, 0.01, start.data()), nullptr);
+  EXPECT_EQ(hamotor_start("euler", 0, 0.01, 0, start.data()), nullptr);
+  EXPECT_EQ(hamotor_start(nullptr, 0, 0.01, 0, start.data()), nullptr);
 }
 
 TEST(ExampleScene, gives_the_state_back_in_the_users_frame) {
-  void* run = hamotor_start("splitting2", 0, 0.01, start.data());
+  void* run = hamotor_start("splitting2", 0, 0.01, 0, start.data());
   ASSERT_NE(run, nullptr);
   std::array<double, 14> state{};
   hamotor_state(run, state.data());
@@ -102,7 +102,7 @@ TEST(ExampleScene, gives_the_state_back_in_the_users_frame) {
 
 TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
   for (const char* method : {"rkmk4", "rk4", "splitting2"}) {
-    void* run = hamotor_start(method, 2.0, 0.001, start.data());
+    void* run = hamotor_start(method, 2.0, 0.001, 0, start.data());
     ASSERT_NE(run, nullptr);
     Row first{};
     hamotor_observe(run, first.data());
@@ -130,7 +130,7 @@ TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
 }
 
 TEST(ExampleScene, keeps_the_last_finite_state) {
-  void* run = hamotor_start("splitting2", 0, 1e200, start.data());
+  void* run = hamotor_start("splitting2", 0, 1e200, 0, start.data());
   ASSERT_NE(run, nullptr);
   const std::int64_t done = hamotor_advance(run, 100, 1, nullptr);
   EXPECT_LT(done, 100);
@@ -138,6 +138,9 @@ TEST(ExampleScene, keeps_the_last_finite_state) {
   hamotor_state(run, state.data());
   for (const double x : state) EXPECT_TRUE(std::isfinite(x));
   EXPECT_EQ(hamotor_advance(run, 1, 1, nullptr), 0);
+  std::int64_t component = -1;
+  EXPECT_EQ(hamotor_failure(run, &component), 1);
+  EXPECT_GE(component, 0);
   hamotor_stop(run);
 }
 

@@ -1,4 +1,4 @@
-"""The compiled scene seen from Python: its C ABI, version 1, bound with ctypes.
+"""The compiled scene seen from Python: its C ABI, version 2, bound with ctypes.
 
 ARCHITECTURE.md states the ABI.  States and rows are contiguous float64 arrays; one row can be had
 in long double.
@@ -10,6 +10,7 @@ import ctypes
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -21,11 +22,20 @@ from numpy.typing import NDArray
 from hamotor.errors import ToolError, UsageError, suggest
 from hamotor.run.attitude import AXES
 
-ABI_VERSION = 1
+ABI_VERSION = 2
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float64]
 WideVector = NDArray[np.longdouble]
+
+
+class Failure(IntEnum):
+    """Why a run could not go on."""
+
+    NONE = 0
+    NOT_FINITE = 1
+    NO_CONVERGENCE = 2
+    STEP_TOO_SHORT = 3
 
 
 @dataclass(frozen=True)
@@ -66,6 +76,8 @@ class Description:
     fma: bool
     bodies: tuple[str, ...]
     methods: Mapping[str, int]
+    error_controlled: frozenset[str]
+    """Methods that can choose their steps by a local tolerance."""
     motor: tuple[str, ...]
     momentum: tuple[str, ...]
     columns: tuple[Column, ...]
@@ -106,7 +118,7 @@ class Description:
 
 
 def describe(text: str) -> Description:
-    """Read the JSON of `hamotor_describe`.  Raises ToolError when it is not what ABI 1 promises."""
+    """Read the JSON of `hamotor_describe`.  Raises ToolError when it is not what ABI 2 promises."""
     try:
         said = json.loads(text)
         if said["abi"] != ABI_VERSION:
@@ -128,6 +140,7 @@ def describe(text: str) -> Description:
             fma=bool(said["fma"]),
             bodies=tuple(said["bodies"]),
             methods={m["name"]: int(m["order"]) for m in said["methods"]},
+            error_controlled=frozenset(m["name"] for m in said["methods"] if m["error_controlled"]),
             motor=tuple(said["motor"]),
             momentum=tuple(said["momentum"]),
             columns=columns,
@@ -178,23 +191,34 @@ class SceneLibrary:
         number = ctypes.c_double
         signatures: dict[str, tuple[Any, list[Any]]] = {
             "hamotor_describe": (ctypes.c_char_p, []),
-            "hamotor_start": (run, [ctypes.c_char_p, number, number, numbers]),
+            "hamotor_start": (run, [ctypes.c_char_p, number, number, number, numbers]),
             "hamotor_advance": (whole, [run, whole, whole, numbers]),
             "hamotor_observe": (None, [run, numbers]),
             "hamotor_observe_wide": (None, [run, ctypes.c_void_p]),
             "hamotor_state": (None, [run, numbers]),
             "hamotor_drift": (None, [run, numbers]),
+            "hamotor_steps": (whole, [run]),
+            "hamotor_failure": (ctypes.c_int32, [run, ctypes.POINTER(whole)]),
             "hamotor_stop": (None, [run]),
         }
         for name, (result, arguments) in signatures.items():
             function = getattr(self._c, name)
             function.restype, function.argtypes = result, arguments
 
-    def start(self, method: str, *, step: float, state: Sequence[float] | Vector) -> LiveRun:
+    def start(
+        self,
+        method: str,
+        *,
+        step: float,
+        state: Sequence[float] | Vector,
+        tolerance: float | None = None,
+    ) -> LiveRun:
         """Begin a run at t = 0.
 
         `state`: shape (state_size,), per body the motor (body to world) and the momentum in the
-        body frame, physical units.  `step` in seconds.  Raises UsageError for an unknown method.
+        body frame, physical units.  `step` in seconds.  `tolerance`, s⁻¹, is the local error per
+        unit of time of a method that chooses steps of its own.  Raises UsageError for an unknown
+        method.
         """
         initial = np.ascontiguousarray(state, dtype=np.float64)
         if initial.shape != (self.description.state_size,):
@@ -203,7 +227,9 @@ class SceneLibrary:
                 f"the compiled scene wants ({self.description.state_size},)"
             )
         check_method(method, self.description.methods)
-        handle = self._c.hamotor_start(method.encode(), 0.0, step, _pointer(initial))
+        handle = self._c.hamotor_start(
+            method.encode(), 0.0, step, tolerance or 0.0, _pointer(initial)
+        )
         if not handle:
             raise ToolError(f'the compiled scene would not start method "{method}"')
         return LiveRun(self._c, handle, self.description)
@@ -268,6 +294,16 @@ class LiveRun:
         drift = np.zeros(2)
         self._c.hamotor_drift(self._handle, _pointer(drift))
         return float(drift[0]), float(drift[1])
+
+    def steps(self) -> int:
+        """Steps taken so far: the method's own where it chooses them."""
+        return int(self._c.hamotor_steps(self._handle))
+
+    def failure(self) -> tuple[Failure, int | None]:
+        """Why the run stopped, and the first number of the state that is not finite, if one is."""
+        component = ctypes.c_int64(-1)
+        reason = self._c.hamotor_failure(self._handle, ctypes.byref(component))
+        return Failure(reason), component.value if component.value >= 0 else None
 
     def stop(self) -> None:
         """Free the run.  Harmless when called twice."""

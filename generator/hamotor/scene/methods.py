@@ -28,13 +28,15 @@ class Method:
     order: int
     description: str
     forms: Form
+    error_controlled: bool = False
+    """Whether it chooses its steps where it is given a local tolerance."""
 
 
 ANY = Form.SPLIT | Form.GENERAL
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
-    Method("rkmk54", 5, "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit", ANY),
+    Method("rkmk54", 5, "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit", ANY, True),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
     Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
     Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),

@@ -157,9 +157,10 @@ class Rkmk54 {
 };
 
 /// A method with an error estimate, in as many steps as keep it below `tolerance` a unit of time
-/// (s⁻¹): `do_step` covers the time h by steps of its own choice and remembers the last for the
-/// next call.  The state becomes not a number where a step would have to be shorter than rounding
-/// of the time it is part of.
+/// (s⁻¹): `do_step` covers the time h by steps of its own choice, the last of which ends there, and
+/// remembers their length for the next call.  Without a tolerance it is the method itself, one step
+/// a call.  The state becomes not a number where a step would have to be shorter than rounding of
+/// the time it is part of.
 template <class System, class Method = Rkmk54<System>>
 class Adaptive {
   using S = typename System::Scalar;
@@ -168,11 +169,22 @@ class Adaptive {
   static constexpr int order = Method::order;
   static constexpr std::string_view name = Method::name;
 
+  constexpr Adaptive() noexcept = default;
   constexpr explicit Adaptive(const S& tolerance) noexcept : tolerance_(tolerance) {}
+
+  /// Asks for this local error a unit of time, s⁻¹; 0 for one step a call.
+  constexpr void set_tolerance(const S& tolerance) noexcept { tolerance_ = tolerance; }
 
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
+    failure_ = Failure::none;
+    if (!(tolerance_ > S(0))) {
+      method_.do_step(system, state, t, h);
+      ++tried_;
+      ++taken_;
+      return;
+    }
     const S direction = scalar::sign(h);
     const S whole = scalar::abs(h);
     S done(0);
@@ -190,12 +202,15 @@ class Adaptive {
       if (accepted) {
         state = trial;
         method_ = method;
+        ++taken_;
         done = last ? whole : done + step;
         // A step cut short by the end of the interval says little about the next.
         if (!last || factor < S(1) || !(proposed_ > step)) proposed_ = factor * step;
       } else {
         proposed_ = factor * step;
         if (!(done + proposed_ > done) || !(proposed_ > scalar::Limits<S>::epsilon() * whole)) {
+          const S error = method.error();
+          failure_ = error - error == S(0) ? Failure::step_too_short : Failure::not_finite;
           for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
           return;
         }
@@ -205,6 +220,19 @@ class Adaptive {
 
   /// How far the steps so far left the group.
   [[nodiscard]] constexpr const auto& drift() const noexcept { return method_.drift(); }
+
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return method_.work();
+  }
+
+  /// Steps taken so far.
+  [[nodiscard]] constexpr long long steps() const noexcept { return taken_; }
+
+  /// Why the last `do_step` could not reach its end.
+  [[nodiscard]] constexpr Failure failure() const noexcept { return failure_; }
 
   /// Steps tried so far, accepted or not.
   [[nodiscard]] constexpr long long tried() const noexcept { return tried_; }
@@ -219,9 +247,11 @@ class Adaptive {
   }
 
   Method method_;
-  S tolerance_;
+  S tolerance_ = S(0);
   S proposed_ = S(0);
+  Failure failure_ = Failure::none;
   long long tried_ = 0;
+  long long taken_ = 0;
 };
 
 }  // namespace hamotor

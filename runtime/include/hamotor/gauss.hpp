@@ -195,6 +195,7 @@ class Gauss {
       if (!(change - change == S(0))) break;
       before = change;
     }
+    failure_ = settled ? Failure::none : Failure::no_convergence;
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = state.motors[i];
@@ -218,6 +219,9 @@ class Gauss {
 
   /// How far the steps so far left the group.
   [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// Whether the last step's stages settled.
+  [[nodiscard]] constexpr Failure failure() const noexcept { return failure_; }
 
   /// Iterations of the last step, each `stages` evaluations.
   [[nodiscard]] constexpr int iterations() const noexcept { return iterations_; }
@@ -353,6 +357,7 @@ class Gauss {
   std::array<S, stages> power_{};
   Drift<S> drift_;
   S work_{};
+  Failure failure_ = Failure::none;
   int iterations_ = 0;
 };
 

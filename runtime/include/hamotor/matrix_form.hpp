@@ -509,6 +509,15 @@ class Run {
 
   [[nodiscard]] const Drift<S>& drift() const noexcept { return drift_; }
 
+  /// Steps taken so far.
+  [[nodiscard]] std::int64_t steps() const noexcept { return index_; }
+
+  /// Why the run stopped; which component is not told, −1.
+  [[nodiscard]] Failure failure(std::int64_t& component) const noexcept {
+    component = -1;
+    return failed_ ? Failure::not_finite : Failure::none;
+  }
+
  private:
   template <class Method>
   [[nodiscard]] std::int64_t advance_with(Method& method, std::int64_t steps, std::int64_t every,

@@ -14,15 +14,15 @@ namespace detail {
 
 template <class System>
 struct Steppers {
-  using type = std::tuple<Rkmk4<System>, Rkmk54<System>, Rk4<System>, LieMidpoint<System>,
+  using type = std::tuple<Rkmk4<System>, Adaptive<System>, Rk4<System>, LieMidpoint<System>,
                           Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 template <SplitSystem System>
 struct Steppers<System> {
   using type =
-      std::tuple<Rkmk4<System>, Rkmk54<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
-                 Splitting6<System>, Splitting8<System>, Splitting10<System>, LieMidpoint<System>,
-                 Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+      std::tuple<Rkmk4<System>, Adaptive<System>, Rk4<System>, Splitting2<System>,
+                 Splitting4<System>, Splitting6<System>, Splitting8<System>, Splitting10<System>,
+                 LieMidpoint<System>, Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 
 }  // namespace detail

@@ -1,4 +1,4 @@
-// The compiled scene's C ABI, version 1: a scene as a type becomes a shared library.
+// The compiled scene's C ABI, version 2: a scene as a type becomes a shared library.
 //
 // A scene is a struct with the members listed in `SceneDefinition`; HAMOTOR_SCENE(MyScene) defines
 // the C functions for it.  States cross the boundary as doubles in the user's body frames; inside,
@@ -289,18 +289,19 @@ inline constexpr std::string_view compiled_method = HAMOTOR_METHOD;
 template <class Method>
 inline constexpr bool is_compiled = compiled_method.empty() || compiled_method == Method::name;
 
-template <class Methods>
+template <class Methods, class S>
 struct MethodTable;
 
 /// The methods a scene can be run with: their names, and one run of whichever is chosen.
-template <class... Method>
-struct MethodTable<std::tuple<Method...>> {
+template <class... Method, class S>
+struct MethodTable<std::tuple<Method...>, S> {
   static_assert((is_compiled<Method> || ...), "HAMOTOR_METHOD names no method of this scene");
 
   [[nodiscard]] static std::string json() {
     JsonList list;
     (list.add("{\"name\": " + json_string(Method::name) +
-              ", \"order\": " + std::to_string(Method::order) + '}'),
+              ", \"order\": " + std::to_string(Method::order) +
+              ", \"error_controlled\": " + (ErrorControlled<Method, S> ? "true" : "false") + '}'),
      ...);
     return list.text();
   }
@@ -314,6 +315,18 @@ struct MethodTable<std::tuple<Method...>> {
   /// Sets `method` to the one called `name`; false if the library is compiled without it.
   [[nodiscard]] static bool choose(std::string_view name, AnyOf& method) {
     return (choose_one<Method>(name, method) || ...);
+  }
+
+  /// Gives the method a tolerance; one that is not positive, or for a method that knows none,
+  /// changes nothing.
+  static void set_tolerance(double tolerance, AnyOf& method) noexcept {
+    std::visit(
+        [&](auto& chosen) {
+          if constexpr (ErrorControlled<std::remove_cvref_t<decltype(chosen)>, S>) {
+            if (tolerance > 0) chosen.set_tolerance(S(tolerance));
+          }
+        },
+        method);
   }
 
  private:
@@ -330,13 +343,13 @@ struct MethodTable<std::tuple<Method...>> {
 };
 
 template <class Scene>
-using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>>;
+using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>, typename Scene::Scalar>;
 
 /// The JSON of `hamotor_describe`.
 template <class Scene>
 [[nodiscard]] std::string description() {
   using Group = typename Scene::Group;
-  return "{\"abi\": 1, \"scene\": " + json_string(Scene::name) +
+  return "{\"abi\": 2, \"scene\": " + json_string(Scene::name) +
          ", \"algebra\": " + json_string(Group::algebra) +
          ", \"group\": " + json_string(Group::name) +
          ", \"scalar\": " + json_string(scalar_name<typename Scene::Scalar>()) +
@@ -362,6 +375,41 @@ template <class G, std::size_t N, class S>
     sum = sum + part;
   }
   return sum == S(0);
+}
+
+/// Where the first number of a state that is not finite stands, −1 if there is none.
+template <class G, std::size_t N, class S>
+[[nodiscard]] constexpr std::int64_t first_not_finite(const State<G, N, S>& state) noexcept {
+  std::int64_t at = 0;
+  const auto is_bad = [](const S& x) { return !(x - x == S(0)); };
+  for (std::size_t i = 0; i < N; ++i) {
+    for (const S& x : state.motors[i].components()) {
+      if (is_bad(x)) return at;
+      ++at;
+    }
+    for (const S& x : state.momenta[i].components()) {
+      if (is_bad(x)) return at;
+      ++at;
+    }
+  }
+  return -1;
+}
+
+/// The steps a method took, `calls` where it has none of its own.
+template <class Method>
+[[nodiscard]] std::int64_t steps_of(const Method& method, std::int64_t calls) noexcept {
+  if constexpr (requires { method.steps(); }) {
+    return static_cast<std::int64_t>(method.steps());
+  } else {
+    return calls;
+  }
+}
+
+/// Why a method delivered a state that is not finite.
+template <class Method>
+[[nodiscard]] Failure reason_of(const Method& method) noexcept {
+  const Failure said = failure_of(method);
+  return said == Failure::none ? Failure::not_finite : said;
 }
 
 /// A scene under way.
@@ -429,16 +477,29 @@ class Run {
 
   [[nodiscard]] const Drift<S>& drift() const noexcept { return drift_; }
 
+  /// Steps taken so far: the method's own where it chooses them.
+  [[nodiscard]] std::int64_t steps() const noexcept {
+    return std::visit([&](const auto& method) { return steps_of(method, index_); }, method_);
+  }
+
+  /// Why the run stopped, and the first component of the refused state that is not finite, as
+  /// `read_state` counts; −1 where all are.
+  [[nodiscard]] Failure failure(std::int64_t& component) const noexcept {
+    component = component_;
+    return failure_;
+  }
+
  private:
   template <class Method>
   [[nodiscard]] std::int64_t advance_with(Method& method, std::int64_t steps, std::int64_t every,
                                           double* rows) noexcept {
-    if (failed_) return 0;
+    if (failure_ != Failure::none) return 0;
     StateOf<System> state = state_;
     for (std::int64_t done = 0; done < steps; ++done) {
       method.do_step(Scene::system, state, now(), step_);
       if (!is_finite(state)) {
-        failed_ = true;
+        failure_ = reason_of(method);
+        component_ = first_not_finite(state);
         return done;
       }
       state_ = state;
@@ -538,7 +599,8 @@ class Run {
   Drift<S> drift_;
   S work_{};
   std::int64_t index_ = 0;
-  bool failed_ = false;
+  std::int64_t component_ = -1;
+  Failure failure_ = Failure::none;
 };
 
 template <class Scene>
@@ -557,10 +619,11 @@ using RunOf = typename RunType<Scene>::type;
 
 /// `hamotor_start`: NULL for a method that is unknown or not compiled, or without memory.
 template <class Scene>
-[[nodiscard]] void* start(const char* method, double time, double step,
+[[nodiscard]] void* start(const char* method, double time, double step, double tolerance,
                           const double* state) noexcept {
   typename MethodsOf<Scene>::AnyOf chosen;
   if (method == nullptr || !MethodsOf<Scene>::choose(method, chosen)) return nullptr;
+  MethodsOf<Scene>::set_tolerance(tolerance, chosen);
   return new (std::nothrow) RunOf<Scene>(chosen, time, step, state);
 }
 
@@ -574,34 +637,41 @@ template <class Scene>
 #endif
 
 /// Defines the C functions of the compiled scene `Scene`; once in a shared library.
-#define HAMOTOR_SCENE(Scene)                                                             \
-  HAMOTOR_SCENE_EXPORT const char* hamotor_describe() {                                  \
-    static const std::string text = hamotor::scene::description<Scene>();                \
-    return text.c_str();                                                                 \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void* hamotor_start(const char* method, double time, double step, \
-                                           const double* state) {                        \
-    return hamotor::scene::start<Scene>(method, time, step, state);                      \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT std::int64_t hamotor_advance(void* run, std::int64_t steps,       \
-                                                    std::int64_t every, double* rows) {  \
-    return static_cast<hamotor::scene::RunOf<Scene>*>(run)->advance(steps, every, rows); \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {              \
-    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                 \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void hamotor_observe_wide(const void* run, long double* row) {    \
-    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                 \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {              \
-    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->read_state(state);            \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void hamotor_drift(const void* run, double* drift) {              \
-    const auto& so_far = static_cast<const hamotor::scene::RunOf<Scene>*>(run)->drift(); \
-    drift[0] = static_cast<double>(so_far.largest);                                      \
-    drift[1] = static_cast<double>(so_far.sum);                                          \
-  }                                                                                      \
-  HAMOTOR_SCENE_EXPORT void hamotor_stop(void* run) {                                    \
-    delete static_cast<hamotor::scene::RunOf<Scene>*>(run);                              \
-  }                                                                                      \
+#define HAMOTOR_SCENE(Scene)                                                                    \
+  HAMOTOR_SCENE_EXPORT const char* hamotor_describe() {                                         \
+    static const std::string text = hamotor::scene::description<Scene>();                       \
+    return text.c_str();                                                                        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void* hamotor_start(const char* method, double time, double step,        \
+                                           double tolerance, const double* state) {             \
+    return hamotor::scene::start<Scene>(method, time, step, tolerance, state);                  \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int64_t hamotor_advance(void* run, std::int64_t steps,              \
+                                                    std::int64_t every, double* rows) {         \
+    return static_cast<hamotor::scene::RunOf<Scene>*>(run)->advance(steps, every, rows);        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {                     \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_observe_wide(const void* run, long double* row) {           \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {                     \
+    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->read_state(state);                   \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_drift(const void* run, double* drift) {                     \
+    const auto& so_far = static_cast<const hamotor::scene::RunOf<Scene>*>(run)->drift();        \
+    drift[0] = static_cast<double>(so_far.largest);                                             \
+    drift[1] = static_cast<double>(so_far.sum);                                                 \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int64_t hamotor_steps(const void* run) {                            \
+    return static_cast<const hamotor::scene::RunOf<Scene>*>(run)->steps();                      \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int32_t hamotor_failure(const void* run, std::int64_t* component) { \
+    return static_cast<std::int32_t>(                                                           \
+        static_cast<const hamotor::scene::RunOf<Scene>*>(run)->failure(*component));            \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_stop(void* run) {                                           \
+    delete static_cast<hamotor::scene::RunOf<Scene>*>(run);                                     \
+  }                                                                                             \
   static_assert(sizeof(hamotor::scene::RunOf<Scene>) > 0)

@@ -197,4 +197,37 @@ concept Stepper = HamiltonianSystem<System> && std::default_initializable<Method
                     { method.drift() } -> std::convertible_to<Drift<typename System::Scalar>>;
                   };
 
+/// A stepper that can choose the steps within a `do_step` itself, by an estimate of their error.
+///
+/// `set_tolerance(e)` asks for a local error of at most e per unit of time, s⁻¹, of a motor's
+/// components and of a momentum's relative to its largest; without it the stepper has a default of
+/// its own, which may be one step a call.  `steps()` are those taken so far.  The state is always
+/// delivered at t + h; a stepper whose last step has a polynomial that reaches there (dense
+/// output) evaluates it, so that its own steps may be longer than h.
+template <class Method, class S>
+concept ErrorControlled = requires(Method method, const Method& constant, const S& tolerance) {
+  { method.set_tolerance(tolerance) } -> std::same_as<void>;
+  { constant.steps() } -> std::convertible_to<long long>;
+};
+
+/// Why a stepper could not take a step.  The momenta it delivers are then not numbers.
+enum class Failure {
+  none,
+  not_finite,      ///< the motion left the finite numbers, or the system has none there
+  no_convergence,  ///< the iteration for an implicit step did not settle
+  step_too_short   ///< the tolerance would need steps below rounding of the time
+};
+
+/// Why a stepper's last step failed: what `failure()` says where the stepper has it.
+template <class Method>
+[[nodiscard]] constexpr Failure failure_of(const Method& method) noexcept {
+  if constexpr (requires {
+                  { method.failure() } -> std::same_as<Failure>;
+                }) {
+    return method.failure();
+  } else {
+    return Failure::none;
+  }
+}
+
 }  // namespace hamotor
