@@ -13,9 +13,17 @@ import pytest
 
 from hamotor.cli import main
 from hamotor.codegen import generate, read_algebra, source_files
-from hamotor.codegen.compiler import SourceFile
+from hamotor.codegen.compiler import SourceFile, compile_algebra
 from hamotor.codegen.spec import bundled_path
-from hamotor.codegen.tree import GENERATED, ROOT, Difference, differences, write
+from hamotor.codegen.tree import (
+    GENERATED,
+    ROOT,
+    Difference,
+    clang_format,
+    differences,
+    formatted,
+    write,
+)
 
 
 def test_committed_files_are_what_the_generator_writes() -> None:
@@ -87,6 +95,33 @@ def test_writing_touches_only_what_changed(tmp_path: Path) -> None:
     assert (tmp_path / "a/two.hpp").read_text("utf-8") == "3\n"
     assert differences(files, tmp_path, ["a"]) == []
     assert not list(tmp_path.rglob("*.tmp"))
+
+
+def test_a_file_formatted_in_pieces_is_the_file_formatted_at_once() -> None:
+    files = compile_algebra(read_algebra(bundled_path("pga3")))
+    (kernels,) = [file for file in files if file.path == "hamotor/pga3/kernels.hpp"]
+    long = SourceFile(kernels.path, kernels.text * 2)
+    assert len(long.text) > 2 * 40_000
+    (found,) = formatted([long])
+    assert found.text == clang_format(long.text)
+
+
+@pytest.mark.long
+def test_products_of_six_dimensions_take_two_processors_five_seconds(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "hamotor", "generate", "--signature", "6,0,0"]
+    environment = os.environ | {"PYTHONPATH": str(ROOT / "generator")}
+    before = os.times()
+    subprocess.run(
+        [*command, "--name", "six", "--out", str(tmp_path)],
+        env=environment,
+        check=True,
+        capture_output=True,
+    )
+    after = os.times()
+    busy = (
+        after.children_user + after.children_system - before.children_user - before.children_system
+    )
+    assert busy < 2 * 5.0
 
 
 @pytest.mark.slow

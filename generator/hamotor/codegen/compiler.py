@@ -52,7 +52,11 @@ class SourceFile:
 
 def compile_algebra(spec: AlgebraSpec) -> tuple[SourceFile, ...]:
     """Every file of an algebra's library, before formatting."""
-    kernels = library(spec)
+    return library_files(spec, library(spec))
+
+
+def library_files(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> tuple[SourceFile, ...]:
+    """The files of a library whose kernels are these, before formatting."""
     folder = f"hamotor/{spec.name}"
     algebra_kernels = [k for k in kernels if not k.namespace]
     basic = [e for e in spec.elements.values() if e.name != "Scalar"] + _defects(kernels)

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 
-from hamotor.codegen.algebra import Algebra, Blade, Rational, grades_of, simplest
+from hamotor.codegen.algebra import (
+    Algebra,
+    Blade,
+    Multivector,
+    Rational,
+    add_scaled,
+    grades_of,
+    simplest,
+)
 
 
 @dataclass(frozen=True)
@@ -59,24 +67,18 @@ class Element:
         if self.functionals is not None:
             return self.functionals
         columns = [component.embedding for component in self.components]
-        blades = sorted({blade for column in columns for blade in column})
         normal = [[_dot(a, b) for b in columns] for a in columns]
         inverse = inverse_matrix(normal)
         if inverse is None:
             raise ValueError(f"the components of {self.name} are linearly dependent")
-        return tuple(
-            {
-                blade: simplest(x)
-                for blade in blades
-                if (
-                    x := sum(
-                        (r * c.get(blade, 0) for r, c in zip(row, columns, strict=True)),
-                        Fraction(0),
-                    )
-                )
-            }
-            for row in inverse
-        )
+        functionals = []
+        for row in inverse:
+            functional: Multivector = {}
+            for factor, column in zip(row, columns, strict=True):
+                if factor:
+                    add_scaled(functional, column, factor)
+            functionals.append({blade: simplest(x) for blade, x in sorted(functional.items())})
+        return tuple(functionals)
 
     @property
     def is_blades(self) -> bool:
@@ -100,10 +102,10 @@ def inverse_matrix(matrix: list[list[Fraction]]) -> list[list[Fraction]] | None:
         if pivot is None:
             return None
         rows[column], rows[pivot] = rows[pivot], rows[column]
-        rows[column] = [x / rows[column][column] for x in rows[column]]
+        if (factor := rows[column][column]) != 1:
+            rows[column] = [x / factor for x in rows[column]]
         for r in range(size):
-            if r != column and rows[r][column]:
-                factor = rows[r][column]
+            if r != column and (factor := rows[r][column]):
                 rows[r] = [x - factor * y for x, y in zip(rows[r], rows[column], strict=True)]
     return [row[size:] for row in rows]
 

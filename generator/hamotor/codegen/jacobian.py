@@ -30,7 +30,7 @@ from hamotor.codegen.algebra import (
 from hamotor.codegen.closedform import Writer, square_of
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
-from hamotor.codegen.kernel import Kernel, value_of, without_unused
+from hamotor.codegen.kernel import Kernel, value_of
 from hamotor.codegen.polynomial import Polynomial
 from hamotor.codegen.program import (
     Call,
@@ -220,7 +220,7 @@ def _closed_form(
                 summands.append((Name(prefix + field), polynomial_expression(values[i])))
         outputs.append((component.name, sum_of_products(summands)))
     program = Program(parameters, tuple(writer.bindings), tuple(outputs), group.rate)
-    return without_unused(program)
+    return program.without_unused()
 
 
 def _split_square(writer: Writer, cubic: Cubic, x: Sequence[Polynomial], sign: int) -> Polynomial:
@@ -270,5 +270,5 @@ def _general(
     method = {"dexp": "dexp_by_doubling", "dexp_inverse": "dexp_inverse_by_elimination"}[name]
     writer.let("jacobian", Call(method, (Name(a.name), Name(b.name), Name("size"))))
     outputs = tuple((c.name, Name(f"jacobian.{c.name}")) for c in group.rate.components)
-    program = without_unused(Program(parameters, tuple(writer.bindings), outputs, group.rate))
+    program = Program(parameters, tuple(writer.bindings), outputs, group.rate).without_unused()
     return Kernel(name, LAWS[name], program, None, group.rate.namespace, None, NOTES[name])

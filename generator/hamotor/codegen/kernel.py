@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from fractions import Fraction
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import (
@@ -27,13 +26,11 @@ from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Expression,
     MultiplyAdd,
-    Name,
     Parameter,
     Product,
     Program,
     number,
     polynomial_expression,
-    walk,
 )
 
 ONE: Polynomial = {(): 1}
@@ -95,7 +92,7 @@ def read_off(value: Mapping[Blade, Polynomial], element: Element) -> dict[str, P
 
 def reversed_value(value: Mapping[Blade, Polynomial]) -> PolynomialMultivector:
     """Reversal ~ of a multivector."""
-    return {b: poly.scaled(p, Fraction(reverse_sign(b))) for b, p in value.items()}
+    return {b: poly.scaled(p, reverse_sign(b)) for b, p in value.items()}
 
 
 def direct_program(
@@ -214,26 +211,8 @@ def chain_kernel(
             }
             partial = {b: p for b, p in bound.items() if p}
     outputs = tuple((n, polynomial_expression(p)) for n, p in read_off(partial, result).items())
-    program = without_unused(Program(parameters, tuple(staging.bindings), outputs, result))
+    program = Program(parameters, tuple(staging.bindings), outputs, result).without_unused()
     return proved(Kernel(name, law, program, read_off(whole, result)))
-
-
-def without_unused(program: Program) -> Program:
-    """The program without bindings that no output needs."""
-    needed = {
-        node.text.split(".")[0]
-        for _, expression in program.outputs
-        for node in walk(expression)
-        if isinstance(node, Name)
-    }
-    kept: list[tuple[str, Expression]] = []
-    for name, expression in reversed(program.bindings):
-        if name in needed:
-            kept.append((name, expression))
-            needed |= {
-                node.text.split(".")[0] for node in walk(expression) if isinstance(node, Name)
-            }
-    return Program(program.parameters, tuple(reversed(kept)), program.outputs, program.result)
 
 
 def moved_value(algebra: Algebra, versor: Element, operand: Element) -> PolynomialMultivector:
@@ -426,7 +405,7 @@ def _sandwich(
         else:
             outputs.append((component.name, Product(factor, inner)))
     bindings = tuple(form.staging.bindings)
-    program = without_unused(Program(parameters, bindings, tuple(outputs), result))
+    program = Program(parameters, bindings, tuple(outputs), result).without_unused()
 
     both = poly.apply_bilinear(
         algebra.geometric,

@@ -6,8 +6,10 @@ text, the polynomial it stands for (`expand`) and numbers in any arithmetic (`ev
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 from hamotor.codegen.algebra import Rational, magnitude
@@ -169,15 +171,24 @@ class Program:
     outputs: tuple[tuple[str, Expression], ...]
     result: Element | None
 
-    @property
+    @cached_property
     def cost(self) -> Cost:
         """Operation count by kind."""
-        total = Cost()
-        for _, expression in (*self.bindings, *self.outputs):
-            for node in walk(expression):
-                total = total + _node_cost(node)
-            total = total + Cost(fused=-_split_sums(expression))
-        return total
+        found = Counter(
+            node.function if isinstance(node, Call) else type(node) for node in self.nodes()
+        )
+        calls = {kind: n for kind, n in found.items() if isinstance(kind, str)}
+        if selects := found[Select]:
+            calls["select"] = selects
+        both = found[MultiplyAdd]
+        split = sum(_split_sums(x) for _, x in (*self.bindings, *self.outputs))
+        return Cost(
+            mul=found[Product] + both,
+            add=found[Sum] + both,
+            fused=both - split,
+            div=found[Quotient],
+            calls=dict(sorted(calls.items())),
+        )
 
     def without_unused(self) -> Program:
         """The same outputs without the bindings that they do not need."""
@@ -227,28 +238,12 @@ class Program:
 
 
 def walk(expression: Expression) -> Iterator[Expression]:
-    """The expression and everything below it."""
-    yield expression
-    for child in children(expression):
-        yield from walk(child)
-
-
-def _node_cost(node: Expression) -> Cost:
-    match node:
-        case Sum():
-            return Cost(add=1)
-        case Product():
-            return Cost(mul=1)
-        case MultiplyAdd():
-            return Cost(mul=1, add=1, fused=1)
-        case Quotient():
-            return Cost(div=1)
-        case Call(function, _):
-            return Cost(calls={function: 1})
-        case Select():
-            return Cost(calls={"select": 1})
-        case _:
-            return Cost()
+    """The expression and everything below it, in the order of reading."""
+    rest = [expression]
+    while rest:
+        node = rest.pop()
+        yield node
+        rest += reversed(children(node))
 
 
 def _split_sums(expression: Expression, inside: bool = False) -> int:

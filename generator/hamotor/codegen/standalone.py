@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from hamotor.codegen.compiler import SourceFile, compile_algebra, kernel_title, render
+from hamotor.codegen.compiler import SourceFile, kernel_title, library_files, render
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import LAWS, library
@@ -24,7 +25,8 @@ RUNTIME_HEADERS = (
 
 def standalone_files(spec: AlgebraSpec, spec_text: str) -> tuple[SourceFile, ...]:
     """Every file of the folder, before formatting: it needs nothing but a C++20 compiler."""
-    headers = [SourceFile(f"include/{f.path}", f.text) for f in compile_algebra(spec)]
+    kernels = library(spec)
+    headers = [SourceFile(f"include/{f.path}", f.text) for f in library_files(spec, kernels)]
     runtime = [
         SourceFile(f"include/{path}", (RUNTIME / path).read_text(encoding="utf-8"))
         for path in RUNTIME_HEADERS
@@ -36,7 +38,7 @@ def standalone_files(spec: AlgebraSpec, spec_text: str) -> tuple[SourceFile, ...
         *runtime,
         SourceFile("CMakeLists.txt", build),
         SourceFile(f"{spec.name}.toml", spec_text),
-        SourceFile(f"test/{spec.name}_test.cpp", _test(spec)),
+        SourceFile(f"test/{spec.name}_test.cpp", _test(spec, kernels)),
     )
 
 
@@ -75,10 +77,10 @@ def _kernel(kernel: Kernel) -> dict[str, Any]:
     }
 
 
-def _test(spec: AlgebraSpec) -> str:
-    kernels = [k for k in library(spec) if not k.namespace]
-    bilinear = [_kernel(k) for k in kernels if k.name in LAWS and _is_storable(k)]
-    sandwiches = [_kernel(k) for k in kernels if k.name == "sandwich"]
+def _test(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
+    shared = [k for k in kernels if not k.namespace]
+    bilinear = [_kernel(k) for k in shared if k.name in LAWS and _is_storable(k)]
+    sandwiches = [_kernel(k) for k in shared if k.name == "sandwich"]
     used = {
         name
         for k in bilinear + sandwiches

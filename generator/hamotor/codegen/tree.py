@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -26,34 +27,60 @@ class Difference:
     path: str
 
 
+ROOM = 40_000
+"""Characters that are formatted at a time: several processes share a long file."""
+COMPONENT = re.compile(r"(?<=[(,] )-?[a-z]\w*\.\w+(?=[,)])|(?<=\()-?[a-z]\w*\.\w+(?=[,)])")
+"""An argument such as `-a.e12`: four tokens, over which clang-format weighs as many line breaks."""
+STAND_IN = re.compile(r"\$z+")
+
+
 def formatted(files: Sequence[SourceFile]) -> tuple[SourceFile, ...]:
-    """The files as clang-format leaves them, in the project's style."""
-    headers = [f for f in files if f.path.endswith((".hpp", ".cpp"))]
-    tool = Path(sys.executable).with_name("clang-format")
-    with tempfile.TemporaryDirectory() as folder:
-        names = []
-        for index, file in enumerate(headers):
-            path = Path(folder) / f"{index}.cpp"
-            path.write_text(file.text, encoding="utf-8")
-            names.append(str(path))
-        command = [str(tool), f"--style=file:{ROOT / '.clang-format'}", "-i"]
-        with ThreadPoolExecutor(os.cpu_count()) as pool:
-            largest_first = sorted(names, key=lambda name: -Path(name).stat().st_size)
-            list(pool.map(lambda name: _run([*command, name]), largest_first))
-        texts = {
-            f.path: Path(n).read_text(encoding="utf-8") for f, n in zip(headers, names, strict=True)
-        }
+    """The files as clang-format leaves them, in the project's style.
+
+    With fewer tokens than components have, it searches further: its layout of the longest
+    statements is better than what it makes of the file itself.
+    """
+    sources = {f.path: _pieces(f.text) for f in files if f.path.endswith((".hpp", ".cpp"))}
+    longest_first = sorted((p for pieces in sources.values() for p in pieces), key=len)[::-1]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        found = dict(zip(longest_first, pool.map(_formatted, longest_first), strict=True))
+    texts = {path: "\n".join(found[p] for p in pieces) for path, pieces in sources.items()}
     return tuple(SourceFile(f.path, texts.get(f.path, f.text)) for f in files)
 
 
-def _run(command: Sequence[str]) -> None:
+def _pieces(text: str) -> list[str]:
+    """The text, cut before documented declarations: their layout does not depend on each other."""
+    first, *others = text.split("\n\n/// ")
+    pieces = [first]
+    for other in others:
+        if len(pieces[-1]) + len(other) > ROOM:
+            pieces.append(f"/// {other}")
+        else:
+            pieces[-1] += f"\n\n/// {other}"
+    return [*(f"{piece}\n" for piece in pieces[:-1]), pieces[-1]]
+
+
+def _formatted(text: str) -> str:
+    """One piece; clang-format sees a word of equal length in place of each component."""
+    shown = COMPONENT.sub(lambda found: "$".ljust(len(found[0]), "z"), text)
+    components = COMPONENT.finditer(text)
+    return STAND_IN.sub(lambda _: next(components)[0], clang_format(shown))
+
+
+def clang_format(text: str) -> str:
+    """C++ text in the project's style.  Raises ToolError where the tool cannot be run."""
+    tool = Path(sys.executable).with_name("clang-format")
+    command = [str(tool), f"--style=file:{ROOT / '.clang-format'}"]
     try:
-        subprocess.run(command, check=True, capture_output=True, text=True)
+        done = subprocess.run(
+            command, input=text, check=True, capture_output=True, encoding="utf-8"
+        )
     except (OSError, subprocess.CalledProcessError) as error:
         detail = error.stderr if isinstance(error, subprocess.CalledProcessError) else error
         raise ToolError(
             f"clang-format failed: {detail}; remove .hamotor/venv and run ./hamotor again"
         ) from error
+    return done.stdout
 
 
 def differences(
