@@ -3,15 +3,23 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "sample_systems.hpp"
 
 namespace {
 
 using hamotor::Adaptive;
+using hamotor::CommutatorFree4;
 using hamotor::Rkmk54;
+using hamotor::Rkmk87;
+using hamotor::StateOf;
 using sample::distance;
 using sample::generic_state;
 using Wide = long double;
@@ -19,29 +27,137 @@ using Wide = long double;
 template <class System>
 using Of = std::remove_const_t<System>;
 
-template <class System>
+template <template <class> class Method, class System>
 auto stepped(const System& system, int steps) {
   using S = typename System::Scalar;
   auto state = generic_state(system);
-  Rkmk54<System> method;
+  Method<System> method;
   for (int k = 0; k < steps; ++k) method.do_step(system, state, 0, 1 / S(steps));
   return state;
 }
 
-template <class System>
-void expect_order_5(const System& system, int coarse) {
-  const auto reference = stepped(system, 16 * coarse);
-  const double fine = distance(stepped(system, 2 * coarse), reference);
-  EXPECT_NEAR(std::log2(distance(stepped(system, coarse), reference) / fine), 5, 0.1);
+template <template <class> class Method, class System>
+void expect_order(const System& system, int coarse) {
+  const auto reference = stepped<Rkmk87>(system, std::max(8 * coarse, 200));
+  const double fine = distance(stepped<Method>(system, 2 * coarse), reference);
+  EXPECT_GT(fine, 1e-17) << "nothing to measure";
+  EXPECT_NEAR(std::log2(distance(stepped<Method>(system, coarse), reference) / fine),
+              Method<System>::order, 0.1)
+      << Method<System>::name;
 }
 
-TEST(Rkmk54, has_order_5) {
-  expect_order_5(sample::free_se3<Wide>(), 80);
-  expect_order_5(sample::free_so3<Wide>(), 40);
-  expect_order_5(sample::forced_se3<Wide>(), 160);
-  expect_order_5(sample::forced_so3<Wide>(), 80);
-  expect_order_5(sample::forced_se2<Wide>(), 160);
-  expect_order_5(sample::two_bodies_se3<Wide>(), 160);
+template <class System>
+void expect_orders(const System& system, int coarse) {
+  expect_order<CommutatorFree4>(system, coarse);
+  expect_order<Rkmk54>(system, coarse);
+}
+
+TEST(ExplicitMethods, have_their_orders) {
+  expect_orders(sample::free_se3<Wide>(), 80);
+  expect_orders(sample::free_so3<Wide>(), 40);
+  expect_orders(sample::forced_se3<Wide>(), 160);
+  expect_orders(sample::forced_so3<Wide>(), 80);
+  expect_orders(sample::forced_se2<Wide>(), 160);
+  expect_orders(sample::two_bodies_se3<Wide>(), 160);
+  expect_order<Rkmk87>(sample::forced_se3<Wide>(), 48);
+  expect_order<Rkmk87>(sample::forced_so3<Wide>(), 16);
+  expect_order<Rkmk87>(sample::forced_se2<Wide>(), 16);
+}
+
+/// A rooted tree by its subtrees, an index into `trees` each; γ is Butcher's density.
+struct Tree {
+  std::vector<std::size_t> branches;
+  int vertices;
+  Wide density;
+};
+
+/// All rooted trees of up to so many vertices: one more vertex under a multiset of smaller trees.
+std::vector<Tree> rooted_trees(int most) {
+  std::vector<Tree> trees;
+  const auto grow = [&](const auto& self, Tree tree, std::size_t from, int left) -> void {
+    if (left == 0) {
+      tree.density *= tree.vertices;
+      trees.push_back(tree);
+      return;
+    }
+    for (std::size_t k = from; k < trees.size() && trees[k].vertices <= left; ++k) {
+      Tree next = tree;
+      next.branches.push_back(k);
+      next.density *= trees[k].density;
+      self(self, next, k, left - trees[k].vertices);
+    }
+  };
+  for (int vertices = 1; vertices <= most; ++vertices) {
+    grow(grow, Tree{{}, vertices, 1}, 0, vertices - 1);
+  }
+  return trees;
+}
+
+/// Largest |Σ b_i Φ_i(t) − θⁿ/γ(t)| over the trees of up to `order` vertices n: Butcher's order
+/// conditions, at the fraction θ of a step.
+template <class Pair, std::size_t stages>
+Wide order_defect(const std::array<Wide, stages>& weights, int order, Wide at = 1) {
+  const auto trees = rooted_trees(order);
+  std::vector<std::array<Wide, stages>> phi;
+  Wide worst = 0;
+  for (const Tree& tree : trees) {
+    std::array<Wide, stages> value{};
+    value.fill(1);
+    for (const std::size_t branch : tree.branches) {
+      for (std::size_t i = 0; i < stages; ++i) {
+        const auto row = hamotor::detail::numbers<Wide>(Pair::rows[i]);
+        Wide sum = 0;
+        for (std::size_t j = 0; j < i; ++j) sum += row[j] * phi[branch][j];
+        value[i] *= sum;
+      }
+    }
+    Wide sum = 0;
+    for (std::size_t i = 0; i < stages; ++i) sum += weights[i] * value[i];
+    worst = std::max(worst, std::abs(sum - std::pow(at, tree.vertices) / tree.density));
+    phi.push_back(value);
+  }
+  return worst;
+}
+
+template <class Pair>
+void expect_order_conditions() {
+  const auto weights = hamotor::detail::numbers<Wide>(Pair::weights);
+  auto lower = weights;
+  const auto error = hamotor::detail::numbers<Wide>(Pair::error);
+  for (std::size_t i = 0; i < lower.size(); ++i) lower[i] -= error[i];
+  EXPECT_LT(order_defect<Pair>(weights, Pair::order), 3e-18L);
+  EXPECT_LT(order_defect<Pair>(lower, Pair::lower_order), 3e-18L);
+  EXPECT_GT(order_defect<Pair>(weights, Pair::order + 1), 1e-7L);
+  EXPECT_GT(order_defect<Pair>(lower, Pair::lower_order + 1), 1e-7L);
+}
+
+TEST(Pairs, meet_the_order_conditions) {
+  EXPECT_EQ(rooted_trees(8).size(), 1U + 1 + 2 + 4 + 9 + 20 + 48 + 115);
+  expect_order_conditions<hamotor::DormandPrince54>();
+  expect_order_conditions<hamotor::PrinceDormand87>();
+}
+
+TEST(DormandPrince54, has_a_continuous_extension_of_order_4) {
+  using Pair = hamotor::DormandPrince54;
+  for (const Wide at : {0.1L, 0.5L, 0.9L, 1.0L}) {
+    EXPECT_LT(order_defect<Pair>(Pair::weights_at<Wide>(at), 4, at), 1e-18L);
+  }
+}
+
+TEST(Rkmk54, is_interpolated_to_order_4_within_a_step) {
+  const auto system = sample::forced_se3<Wide>();
+  using System = Of<decltype(system)>;
+  const auto start = generic_state(system);
+  const auto error = [&](Wide h) {
+    auto state = start;
+    Rkmk54<System> method;
+    method.do_step(system, state, 0, h);
+    auto reference = start;
+    Rkmk87<System> finer;
+    finer.do_step(system, reference, 0, h * 0.4L);
+    return distance(method.between(start, 0.4L), reference);
+  };
+  EXPECT_NEAR(std::log2(error(0.002L) / error(0.001L)), 5, 0.1);
 }
 
 TEST(Rkmk54, estimates_an_error_of_fifth_order_in_the_step) {
@@ -57,7 +173,7 @@ TEST(Rkmk54, estimates_an_error_of_fifth_order_in_the_step) {
 
 template <class System>
 void expect_tolerance_met(const System& system) {
-  const auto reference = stepped(system, 4000);
+  const auto reference = stepped<Rkmk87>(system, 400);
   double before = 1;
   long long tried_before = 0;
   for (const double tolerance : {1e-5, 1e-7, 1e-9}) {
@@ -108,6 +224,71 @@ TEST(Adaptive, remembers_its_step_from_call_to_call) {
   EXPECT_LE(method.tried() - method.steps(), refused + 2);
   EXPECT_NEAR(static_cast<double>(method.steps()), 2.0 * static_cast<double>(taken),
               0.3 * static_cast<double>(taken));
+}
+
+/// The states at the given times, and how many steps were taken.
+template <class Method, class System>
+auto states_at(const System& system, const std::vector<double>& times) {
+  auto state = generic_state(system);
+  Method method(1e-9);
+  std::vector<StateOf<System>> states;
+  double t = 0;
+  for (const double time : times) {
+    method.do_step(system, state, t, time - t);
+    t = time;
+    states.push_back(state);
+  }
+  return std::pair{states, method.steps()};
+}
+
+template <class Method, class System>
+void expect_output_for_nothing(const System& system) {
+  std::vector<double> often;
+  for (int k = 1; k <= 400; ++k) often.push_back(k / 200.0);
+  const auto [rare, few] = states_at<Method>(system, {1.0, 2.0});
+  const auto [dense, many] = states_at<Method>(system, often);
+  EXPECT_EQ(many, few);
+  EXPECT_LT(distance(dense[399], rare[1]), 1e-15);
+  for (const std::size_t k : {37U, 101U, 250U}) {
+    Rkmk87<System> finer;
+    auto reference = generic_state(system);
+    for (int j = 0; j < 100; ++j) finer.do_step(system, reference, 0, often[k] / 100);
+    EXPECT_LT(distance(dense[k], reference), 1e-7);
+  }
+}
+
+TEST(Adaptive, takes_no_step_more_for_states_at_more_times) {
+  const auto system = sample::forced_se3();
+  using System = Of<decltype(system)>;
+  expect_output_for_nothing<Adaptive<System>>(system);
+  expect_output_for_nothing<Adaptive<System, Rkmk87<System>>>(system);
+}
+
+TEST(Adaptive, of_order_8_needs_fewer_evaluations_for_a_small_error) {
+  const auto system = sample::forced_so3();
+  using System = Of<decltype(system)>;
+  auto state = generic_state(system);
+  auto other = state;
+  Adaptive<System, Rkmk87<System>> high(1e-11);
+  Adaptive<System> low(1e-11);
+  high.do_step(system, state, 0, 1);
+  low.do_step(system, other, 0, 1);
+  EXPECT_LT(distance(state, other), 1e-10);
+  EXPECT_LT(13 * high.tried(), 3 * low.tried());
+}
+
+TEST(Adaptive, starts_anew_from_a_state_that_was_changed) {
+  const auto system = sample::forced_so3();
+  using System = Of<decltype(system)>;
+  auto state = generic_state(system);
+  Adaptive<System> used(1e-9);
+  used.do_step(system, state, 0, 0.3);
+  state.motors[0] = gp(state.motors[0], state.motors[0]);
+  auto same = state;
+  used.do_step(system, state, 0.3, 0.3);
+  Adaptive<System> fresh(1e-9);
+  fresh.do_step(system, same, 0.3, 0.3);
+  EXPECT_EQ(state, same);
 }
 
 TEST(Adaptive, runs_backwards) {

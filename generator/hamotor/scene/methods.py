@@ -37,6 +37,8 @@ AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
     Method("rkmk54", 5, "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit", ANY, True),
+    Method("rkmk87", 8, "the same by Prince & Dormand's pair", ANY, True),
+    Method("cf4", 4, "commutator-free, explicit: two exponentials in place of brackets", ANY),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
     Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
     Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),

@@ -1,166 +1,24 @@
-// Explicit Runge–Kutta–Munthe-Kaas of order 5 with an embedded error estimate, and steps of its own
-// choice: for dissipative and non-smooth forques.
+// Steps of a length that a tolerance asks for, and states at the times that a caller asks for.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <limits>
 #include <string_view>
 
+#include "hamotor/rkmk.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/state.hpp"
-#include "hamotor/steppers.hpp"
 
 namespace hamotor {
 
-namespace detail {
-
-/// A rational coefficient.
-struct Ratio {
-  long long over;
-  long long under;
-};
-
-/// Dormand & Prince 1980, 5(4): rows of a; the last is b as well.
-inline constexpr std::array<std::array<Ratio, 6>, 7> dormand_prince{{
-    {},
-    {{{1, 5}}},
-    {{{3, 40}, {9, 40}}},
-    {{{44, 45}, {-56, 15}, {32, 9}}},
-    {{{19372, 6561}, {-25360, 2187}, {64448, 6561}, {-212, 729}}},
-    {{{9017, 3168}, {-355, 33}, {46732, 5247}, {49, 176}, {-5103, 18656}}},
-    {{{35, 384}, {0, 1}, {500, 1113}, {125, 192}, {-2187, 6784}, {11, 84}}},
-}};
-
-/// b of order 5 less b of order 4.
-inline constexpr std::array<Ratio, 7> dormand_prince_error{
-    {{71, 57600}, {0, 1}, {-71, 16695}, {71, 1920}, {-17253, 339200}, {22, 525}, {-1, 40}}};
-
-/// The number, 0 where a row has ended.
-template <class S>
-[[nodiscard]] constexpr S number(const Ratio& x) noexcept {
-  return x.over == 0 ? S(0) : S(x.over) / S(x.under);
-}
-
-}  // namespace detail
-
-/// Runge–Kutta–Munthe-Kaas of order 5 by Dormand & Prince's pair 5(4), with the error of its
-/// embedded method of order 4 (Munthe-Kaas 1999): seven evaluations a step; not symplectic.
-template <HamiltonianSystem System>
-class Rkmk54 {
-  using S = typename System::Scalar;
-  using G = typename System::Group;
-  using Rate = typename G::template Rate<S>;
-  using Momentum = typename G::template Momentum<S>;
-  static constexpr std::size_t n = System::bodies;
-  static constexpr std::size_t stages = 7;
-
- public:
-  static constexpr int order = 5;
-  static constexpr std::string_view name = "rkmk54";
-
-  /// Takes `state` from t to t + h.
-  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
-                         const S& h) noexcept {
-    std::array<std::array<Rate, n>, stages> slopes{};
-    std::array<std::array<Momentum, n>, stages> forces{};
-    std::array<S, stages> powers{};
-    StateOf<System> there = state;
-    std::array<Rate, n> x{};
-    for (std::size_t s = 0; s < stages; ++s) {
-      S node(0);
-      for (std::size_t r = 0; r < s; ++r) {
-        node = node + detail::number<S>(detail::dormand_prince[s][r]);
-      }
-      for (std::size_t i = 0; i < n && s > 0; ++i) {
-        x[i] = Rate{};
-        there.momenta[i] = state.momenta[i];
-        for (std::size_t r = 0; r < s; ++r) {
-          const S a = h * detail::number<S>(detail::dormand_prince[s][r]);
-          x[i] = mul_add(a, slopes[r][i], x[i]);
-          there.momenta[i] = mul_add(a, forces[r][i], there.momenta[i]);
-        }
-        there.motors[i] = gp(state.motors[i], exp(x[i]));
-      }
-      const S then = mul_add(node, h, t);
-      const auto now = gradient(system, there, then);
-      if constexpr (PoweredSystem<System>) powers[s] = system.power(there, then);
-      forces[s] = free_momentum_rates(system, there.momenta, now.rates);
-      for (std::size_t i = 0; i < n; ++i) {
-        slopes[s][i] = dexp_inverse(x[i], now.rates[i]);
-        if constexpr (System::has_forque) forces[s][i] = forces[s][i] - now.forques[i];
-      }
-    }
-    error_ = S(0);
-    S worst(0);
-    for (std::size_t i = 0; i < n; ++i) {
-      Rate turned{};
-      Momentum pushed{};
-      for (std::size_t s = 0; s < stages; ++s) {
-        const S e = h * detail::number<S>(detail::dormand_prince_error[s]);
-        turned = mul_add(e, slopes[s][i], turned);
-        pushed = mul_add(e, forces[s][i], pushed);
-      }
-      // The last stage is the step: the row of its coefficients is that of the method.
-      auto& motor = there.motors[i];
-      const S off = size(S(0.5) * kinematics(motor, turned));
-      const S momentum = size(there.momenta[i]);
-      const S push = size(pushed);
-      error_ = scalar::max_abs(error_, off, select(momentum > push, push / momentum, push));
-      const auto defect = unit_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
-      motor = motor + unit_correction(motor, defect);
-    }
-    state = there;
-    if constexpr (PoweredSystem<System>) {
-      for (std::size_t s = 0; s + 1 < stages; ++s) {
-        work_ =
-            mul_add(h * detail::number<S>(detail::dormand_prince[stages - 1][s]), powers[s], work_);
-      }
-    }
-    detail::record(drift_, worst);
-  }
-
-  /// The estimated error of the last step, by the method of order 4: the largest of a motor's
-  /// component, and of a momentum's relative to the largest component of it.
-  [[nodiscard]] constexpr const S& error() const noexcept { return error_; }
-
-  /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
-
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
-  [[nodiscard]] constexpr const S& work() const noexcept
-    requires PoweredSystem<System>
-  {
-    return work_;
-  }
-
- private:
-  /// B + ½ [X, B] + 1/12 ad² B − 1/720 ad⁴ B; the next term is of sixth order in X.
-  [[nodiscard]] static constexpr Rate dexp_inverse(const Rate& x, const Rate& b) noexcept {
-    const Rate once = ad(x, b);
-    const Rate twice = ad(x, once);
-    const Rate fourth = ad(x, ad(x, twice));
-    return mul_add(S(-1) / S(720), fourth, mul_add(S(1) / S(12), twice, mul_add(S(0.5), once, b)));
-  }
-
-  template <class T>
-  [[nodiscard]] static constexpr S size(const T& x) noexcept {
-    S largest(0);
-    for (const S& c : x.components()) largest = scalar::max_abs(largest, c);
-    return largest;
-  }
-
-  Drift<S> drift_;
-  S error_ = S(0);
-  S work_{};
-};
-
-/// A method with an error estimate, in as many steps as keep it below `tolerance` a unit of time
-/// (s⁻¹): `do_step` covers the time h by steps of its own choice, the last of which ends there, and
-/// remembers their length for the next call.  Without a tolerance it is the method itself, one step
-/// a call.  The state becomes not a number where a step would have to be shorter than rounding of
-/// the time it is part of.
+/// A pair with an error estimate, in steps that keep it below `tolerance` a unit of time (s⁻¹).
+///
+/// The steps are the pair's own, whatever times are asked for: a state within the last of them is
+/// interpolated (dense output, of order 4) where the pair can, so that it costs nothing; where it
+/// cannot, one step leads there from the last one's start.  A state that is not the one delivered
+/// before, or a time that is not, starts anew.  Without a tolerance it is the method itself, one
+/// step a call.  The state becomes not a number where a step would have to be shorter than rounding
+/// of the time it is part of.
 template <class System, class Method = Rkmk54<System>>
 class Adaptive {
   using S = typename System::Scalar;
@@ -180,52 +38,35 @@ class Adaptive {
                          const S& h) noexcept {
     failure_ = Failure::none;
     if (!(tolerance_ > S(0))) {
-      method_.do_step(system, state, t, h);
+      ahead_.method.do_step(system, state, t, h);
+      if constexpr (PoweredSystem<System>) work_ = ahead_.method.work();
       ++tried_;
       ++taken_;
       return;
     }
     const S direction = scalar::sign(h);
-    const S whole = scalar::abs(h);
-    S done(0);
-    while (done < whole) {
-      const bool last = !(proposed_ > S(0)) || done + proposed_ >= whole;
-      const S step = last ? whole - done : proposed_;
-      StateOf<System> trial = state;
-      Method method = method_;
-      method.do_step(system, trial, mul_add(direction, done, t), direction * step);
-      ++tried_;
-      // Per unit step: the estimate, of order p, over h goes as h^(p−1).
-      const S ratio = method.error() / (tolerance_ * step);
-      const bool accepted = ratio <= S(1);
-      const S factor = shrinking(ratio);
-      if (accepted) {
-        state = trial;
-        method_ = method;
-        ++taken_;
-        done = last ? whole : done + step;
-        // A step cut short by the end of the interval says little about the next.
-        if (!last || factor < S(1) || !(proposed_ > step)) proposed_ = factor * step;
-      } else {
-        proposed_ = factor * step;
-        if (!(done + proposed_ > done) || !(proposed_ > scalar::Limits<S>::epsilon() * whole)) {
-          const S error = method.error();
-          failure_ = error - error == S(0) ? Failure::step_too_short : Failure::not_finite;
-          for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
-          return;
-        }
+    const S target = t + h;
+    if (!goes_on(state, t, direction)) start(system, state, t, h);
+    // Times that differ by rounding are the same.
+    const S slack = S(4) * scalar::Limits<S>::epsilon() * scalar::max_abs(target, ahead_.time, h);
+    while (direction * (target - ahead_.time) > slack) {
+      if (!advance(system, h)) {
+        for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+        delivered_ = state;
+        return;
       }
     }
+    deliver(system, state, target, slack);
   }
 
   /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const auto& drift() const noexcept { return method_.drift(); }
+  [[nodiscard]] constexpr const auto& drift() const noexcept { return ahead_.method.drift(); }
 
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  /// ∫ dH/dt dt over the time so far, J, by the method's own quadrature.
   [[nodiscard]] constexpr const S& work() const noexcept
     requires PoweredSystem<System>
   {
-    return method_.work();
+    return work_;
   }
 
   /// Steps taken so far.
@@ -238,17 +79,109 @@ class Adaptive {
   [[nodiscard]] constexpr long long tried() const noexcept { return tried_; }
 
  private:
-  /// 0.9 ratio^(−1/4), within 1/5 and 5.
-  [[nodiscard]] static constexpr S shrinking(const S& ratio) noexcept {
+  /// A state that a step ends in.
+  struct Mark {
+    S time = S(0);
+    StateOf<System> state{};
+    Method method{};
+  };
+
+  [[nodiscard]] constexpr bool goes_on(const StateOf<System>& state, const S& t,
+                                       const S& direction) const noexcept {
+    const S slack = S(64) * scalar::Limits<S>::epsilon() * scalar::max_abs(t, ahead_.time);
+    return direction * proposed_ > S(0) && scalar::abs(t - delivered_time_) <= slack &&
+           state == delivered_;
+  }
+
+  /// The first step: so short that neither a motor nor a momentum changes by more than a
+  /// hundredth.
+  constexpr void start(const System& system, const StateOf<System>& state, const S& t,
+                       const S& h) noexcept {
+    ahead_.time = t;
+    ahead_.state = state;
+    const auto slope = detail::slope_of(system, state, t);
+    proposed_ = h;
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      shorten(detail::largest(state.motors[i]),
+              detail::largest(kinematics(state.motors[i], slope.rates[i])));
+      shorten(detail::largest(state.momenta[i]), detail::largest(slope.forces[i]));
+    }
+    before_ = ahead_;
+  }
+
+  constexpr void shorten(const S& size, const S& change) noexcept {
+    const S hundredth = S(0.01) * size;
+    if (hundredth > S(0) && scalar::abs(proposed_) * change > hundredth) {
+      proposed_ = scalar::sign(proposed_) * (hundredth / change);
+    }
+  }
+
+  /// One step ahead, of whatever length is accepted; false where none can be that counts beside the
+  /// time and h.
+  [[nodiscard]] constexpr bool advance(const System& system, const S& h) noexcept {
+    for (bool refused = false;; refused = true) {
+      Mark next = ahead_;
+      next.method.do_step(system, next.state, ahead_.time, proposed_);
+      next.time = ahead_.time + proposed_;
+      ++tried_;
+      const S ratio = next.method.error() / (tolerance_ * scalar::abs(proposed_));
+      S factor = factor_for(ratio);
+      if (ratio <= S(1)) {
+        before_ = ahead_;
+        ahead_ = next;
+        ++taken_;
+        if (refused && factor > S(1)) factor = S(1);
+        proposed_ = factor * proposed_;
+        return true;
+      }
+      proposed_ = factor * proposed_;
+      const S least = scalar::Limits<S>::epsilon() * scalar::max_abs(ahead_.time, h);
+      if (!(scalar::abs(proposed_) > least)) {
+        failure_ = ratio - ratio == S(0) ? Failure::step_too_short : Failure::not_finite;
+        proposed_ = S(0);
+        return false;
+      }
+    }
+  }
+
+  constexpr void deliver(const System& system, StateOf<System>& state, const S& target,
+                         const S& slack) noexcept {
+    const S step = ahead_.time - before_.time;
+    if (scalar::abs(ahead_.time - target) <= slack) {
+      state = ahead_.state;
+      if constexpr (PoweredSystem<System>) work_ = ahead_.method.work();
+    } else if constexpr (Method::is_dense) {
+      const S at = (target - before_.time) / step;
+      state = ahead_.method.between(before_.state, at);
+      if constexpr (PoweredSystem<System>) {
+        work_ = ahead_.method.work() - ahead_.method.work_after(at);
+      }
+    } else {
+      Method method = before_.method;
+      state = before_.state;
+      method.do_step(system, state, before_.time, target - before_.time);
+      if constexpr (PoweredSystem<System>) work_ = method.work();
+    }
+    delivered_ = state;
+    delivered_time_ = target;
+  }
+
+  /// 0.9 ratio^(−1/p), within 1/5 and 5: the estimate of order p over h goes as h^p.
+  [[nodiscard]] static constexpr S factor_for(const S& ratio) noexcept {
     if (!(ratio - ratio == S(0))) return S(0.2);
-    if (!(ratio > S(1) / S(10000))) return S(5);
-    const S factor = S(0.9) / scalar::sqrt(scalar::sqrt(ratio));
+    const S least = S(1) / S(1000000);
+    const S factor = S(0.9) * scalar::exp(scalar::log(select(ratio > least, ratio, least)) /
+                                          S(-Method::lower_order));
     return select(factor < S(0.2), S(0.2), select(factor > S(5), S(5), factor));
   }
 
-  Method method_;
+  Mark before_;  ///< where the last step began
+  Mark ahead_;   ///< where it ended: at the delivered time or later
+  StateOf<System> delivered_{};
+  S delivered_time_ = S(0);
   S tolerance_ = S(0);
-  S proposed_ = S(0);
+  S proposed_ = S(0);  ///< signed
+  S work_{};
   Failure failure_ = Failure::none;
   long long tried_ = 0;
   long long taken_ = 0;

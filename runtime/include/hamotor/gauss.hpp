@@ -12,6 +12,7 @@
 #include <limits>
 #include <string_view>
 
+#include "hamotor/compensated.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/splitting_schemes.hpp"
 #include "hamotor/state.hpp"
@@ -85,17 +86,6 @@ template <class S, std::size_t stages>
   }
   return table;
 }
-
-/// Largest absolute component.
-template <class T>
-[[nodiscard]] constexpr typename T::Scalar largest(const T& x) noexcept {
-  typename T::Scalar worst(0);
-  for (const auto& c : x.components()) worst = scalar::max_abs(worst, c);
-  return worst;
-}
-
-/// Terms after which every series of dexp has converged, if it converges at all.
-inline constexpr int most_series_terms = 60;
 
 /// Σ (−1)^k/(k+1)! f^k(y), the series of dexp where f is ad_ξ and of its transpose where f is
 /// ad*_ξ.
@@ -172,7 +162,7 @@ class Gauss {
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
   static constexpr std::size_t n = System::bodies;
-  static inline const auto table = detail::gauss_table<S, stages>();
+  static constexpr auto table = detail::gauss_table<S, stages>();
   static constexpr int most_iterations = 100;
 
  public:

@@ -90,6 +90,11 @@ struct Defect {
   using Scalar = S;
   Multivector<Tables::vectors, S> values;
   [[nodiscard]] constexpr const auto& components() const noexcept { return values; }
+  [[nodiscard]] friend constexpr Defect operator+(const Defect& a, const Defect& b) noexcept {
+    Defect sum = a;
+    for (std::size_t k = 0; k < sum.values.size(); ++k) sum.values[k] += b.values[k];
+    return sum;
+  }
 };
 
 /// The group that the tables describe.
@@ -256,6 +261,14 @@ template <class Tables, class S>
   Defect<Tables, S> defect{detail::product<Tables, S>(m.values, detail::reversed(m.values))};
   defect.values[0] -= S(1);
   return defect;
+}
+
+/// M low~ + low M~: by how much the defect of M + low differs, but for low².
+template <class Tables, class S>
+[[nodiscard]] Defect<Tables, S> unit_defect_change(const ElementOf<Tables, S>& m,
+                                                   const ElementOf<Tables, S>& low) noexcept {
+  return Defect<Tables, S>{detail::product<Tables, S>(m.values, detail::reversed(low.values))} +
+         Defect<Tables, S>{detail::product<Tables, S>(low.values, detail::reversed(m.values))};
 }
 
 /// −½ (M M~ − 1) M: what takes M back to the group.

@@ -5,6 +5,7 @@
 
 #include "hamotor/adaptive.hpp"
 #include "hamotor/gauss.hpp"
+#include "hamotor/rkmk.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
 
@@ -14,15 +15,17 @@ namespace detail {
 
 template <class System>
 struct Steppers {
-  using type = std::tuple<Rkmk4<System>, Adaptive<System>, Rk4<System>, LieMidpoint<System>,
-                          Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+  using type = std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
+                          CommutatorFree4<System>, Rk4<System>, LieMidpoint<System>, Gauss4<System>,
+                          Gauss6<System>, Gauss8<System>>;
 };
 template <SplitSystem System>
 struct Steppers<System> {
   using type =
-      std::tuple<Rkmk4<System>, Adaptive<System>, Rk4<System>, Splitting2<System>,
-                 Splitting4<System>, Splitting6<System>, Splitting8<System>, Splitting10<System>,
-                 LieMidpoint<System>, Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+      std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
+                 CommutatorFree4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
+                 Splitting6<System>, Splitting8<System>, Splitting10<System>, LieMidpoint<System>,
+                 Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 
 }  // namespace detail

@@ -1,0 +1,311 @@
+// Explicit Lie-group Runge–Kutta methods: for dissipative and non-smooth forques, and wherever an
+// error estimate is worth more than a structure.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <string_view>
+#include <type_traits>
+
+#include "hamotor/compensated.hpp"
+#include "hamotor/runge_kutta_pairs.hpp"
+#include "hamotor/scalar.hpp"
+#include "hamotor/state.hpp"
+#include "hamotor/steppers.hpp"
+
+namespace hamotor {
+
+namespace detail {
+
+/// B_k/k! of even k (Bernoulli), by k/2 − 1.
+inline constexpr std::array<Ratio, 4> bernoulli{{{1, 12}, {-1, 720}, {1, 30240}, {-1, 1209600}}};
+
+/// Ẋ = Σ (−1)^k B_k/k! ad_X^k B of M = M₀ exp X, Ṁ = M B, to the order of a method: of X = O(h) the
+/// part along B does not count, so that ad_X^k B = O(h^(k+1)).
+template <int order, class Rate>
+[[nodiscard]] constexpr Rate dexp_inverse_series(const Rate& x, const Rate& b) noexcept {
+  using S = typename Rate::Scalar;
+  Rate power = ad(x, b);
+  Rate sum = mul_add(S(0.5), power, b);
+  for (std::size_t k = 0; 2 * static_cast<int>(k) + 3 <= order; ++k) {
+    if (k > 0) power = ad(x, power);
+    power = ad(x, power);
+    sum = mul_add(number<S>(bernoulli[k]), power, sum);
+  }
+  return sum;
+}
+
+/// H at a state and what its steppers need of it: Ẋ, μ̇ and dH/dt.
+template <class System>
+struct Slope {
+  std::array<typename System::Group::template Rate<typename System::Scalar>, System::bodies> rates;
+  std::array<typename System::Group::template Momentum<typename System::Scalar>, System::bodies>
+      forces;
+  typename System::Scalar power{};
+};
+
+/// B, [μ, B] − F and dH/dt at a state and a time.
+template <class System>
+[[nodiscard]] constexpr Slope<System> slope_of(const System& system, const StateOf<System>& state,
+                                               const typename System::Scalar& t) noexcept {
+  const auto now = gradient(system, state, t);
+  Slope<System> slope{now.rates, free_momentum_rates(system, state.momenta, now.rates), {}};
+  if constexpr (System::has_forque) {
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      slope.forces[i] = slope.forces[i] - now.forques[i];
+    }
+  }
+  if constexpr (PoweredSystem<System>) slope.power = system.power(state, t);
+  return slope;
+}
+
+}  // namespace detail
+
+/// Runge–Kutta–Munthe-Kaas by an embedded pair: an explicit method for X in M = M₀ exp X and for μ,
+/// and the error of the lower order (Munthe-Kaas 1999).  Not symplectic.  Sums are compensated
+/// where steps are long enough for it to cost little.
+template <HamiltonianSystem System, class Pair,
+          Summation summation = (Pair::order > 5) ? Summation::compensated : Summation::plain>
+class Rkmk {
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Rate = typename G::template Rate<S>;
+  using Momentum = typename G::template Momentum<S>;
+  static constexpr std::size_t n = System::bodies;
+  static constexpr std::size_t stages = Pair::stages;
+  static constexpr bool compensated = summation == Summation::compensated;
+
+ public:
+  static constexpr int order = Pair::order;
+  static constexpr int lower_order = Pair::lower_order;
+  static constexpr std::string_view name = Pair::name;
+  /// Whether `between` gives the motion within the last step.
+  static constexpr bool is_dense = requires { Pair::template weights_at<S>(S(0)); };
+
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                         const S& h) noexcept {
+    h_ = h;
+    std::array<Rate, n> x{};
+    StateOf<System> there = state;
+    for (std::size_t s = 0; s < stages; ++s) {
+      if (s > 0) {
+        const Sum sum = combined(table.rows[s], s);
+        x = sum.rates;
+        for (std::size_t i = 0; i < n; ++i) {
+          there.momenta[i] = state.momenta[i] + sum.forces[i];
+          there.motors[i] = gp(state.motors[i], exp(x[i]));
+        }
+      }
+      slopes_[s] = detail::slope_of(system, there, mul_add(table.nodes[s], h, t));
+      for (std::size_t i = 0; i < n && s > 0; ++i) {
+        slopes_[s].rates[i] = detail::dexp_inverse_series<order>(x[i], slopes_[s].rates[i]);
+      }
+    }
+    const Sum sum = combined(table.weights, stages);
+    const S worst = move(state, sum);
+    work_ = work_ + sum.power;
+    error_ = error_of(state, combined(table.error, stages));
+    detail::record(drift_, worst);
+  }
+
+  /// The state at the fraction `at` of the last step, which began at `start`; of order 4.
+  [[nodiscard]] constexpr StateOf<System> between(const StateOf<System>& start,
+                                                  const S& at) const noexcept
+    requires(is_dense)
+  {
+    const Sum sum = combined(Pair::template weights_at<S>(at), stages);
+    StateOf<System> there = start;
+    for (std::size_t i = 0; i < n; ++i) {
+      auto& motor = there.motors[i];
+      motor = gp(motor, exp(sum.rates[i]));
+      motor = motor + unit_correction(motor, unit_defect(motor));
+      there.momenta[i] = there.momenta[i] + sum.forces[i];
+    }
+    return there;
+  }
+
+  /// ∫ dH/dt dt from the fraction `at` of the last step to its end, J.
+  [[nodiscard]] constexpr S work_after(const S& at) const noexcept
+    requires(is_dense)
+  {
+    return combined(table.weights, stages).power -
+           combined(Pair::template weights_at<S>(at), stages).power;
+  }
+
+  /// The estimated error of the last step, by the embedded method: the largest of a motor's
+  /// component, and of a momentum's relative to the largest component of it.
+  [[nodiscard]] constexpr const S& error() const noexcept { return error_; }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return work_;
+  }
+
+ private:
+  struct Nothing {};
+  using Sum = detail::Slope<System>;
+
+  /// The pair's numbers, rounded to S once.
+  struct Table {
+    std::array<std::array<S, stages>, stages> rows{};
+    std::array<S, stages> nodes{};
+    std::array<S, stages> weights = detail::numbers<S>(Pair::weights);
+    std::array<S, stages> error = detail::numbers<S>(Pair::error);
+
+    constexpr Table() noexcept {
+      using Wide = detail::CoefficientScalar<S>;
+      for (std::size_t s = 0; s < stages; ++s) {
+        rows[s] = detail::numbers<S>(Pair::rows[s]);
+        Wide node(0);
+        for (const auto& x : detail::numbers<Wide>(Pair::rows[s])) node = node + x;
+        nodes[s] = static_cast<S>(node);
+      }
+    }
+  };
+  static constexpr Table table{};
+
+  /// h Σ c_r slope_r over the first `count` stages.
+  [[nodiscard]] constexpr Sum combined(const std::array<S, stages>& c,
+                                       std::size_t count) const noexcept {
+    Sum sum{};
+    for (std::size_t r = 0; r < count; ++r) {
+      if (c[r] == S(0)) continue;
+      const S by = h_ * c[r];
+      for (std::size_t i = 0; i < n; ++i) {
+        sum.rates[i] = mul_add(by, slopes_[r].rates[i], sum.rates[i]);
+        sum.forces[i] = mul_add(by, slopes_[r].forces[i], sum.forces[i]);
+      }
+      if constexpr (PoweredSystem<System>) sum.power = mul_add(by, slopes_[r].power, sum.power);
+    }
+    return sum;
+  }
+
+  /// Moves the state by X and μ; returns how far it left the group.
+  [[nodiscard]] constexpr S move(StateOf<System>& state, const Sum& by) noexcept {
+    if constexpr (compensated) {
+      ChangeOf<System> change{{}, by.forces};
+      for (std::size_t i = 0; i < n; ++i) {
+        change.motors[i] = detail::motor_change(state.motors[i], by.rates[i]);
+      }
+      return low_.add(state, change);
+    } else {
+      S worst(0);
+      for (std::size_t i = 0; i < n; ++i) {
+        auto& motor = state.motors[i];
+        motor = gp(motor, exp(by.rates[i]));
+        const auto defect = unit_defect(motor);
+        worst = scalar::max_abs(worst, detail::size(defect));
+        motor = motor + unit_correction(motor, defect);
+        state.momenta[i] = state.momenta[i] + by.forces[i];
+      }
+      return worst;
+    }
+  }
+
+  [[nodiscard]] static constexpr S error_of(const StateOf<System>& state, const Sum& by) noexcept {
+    S worst(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const S off = detail::largest(S(0.5) * kinematics(state.motors[i], by.rates[i]));
+      const S momentum = detail::largest(state.momenta[i]);
+      const S push = detail::largest(by.forces[i]);
+      worst = scalar::max_abs(worst, off, select(momentum > push, push / momentum, push));
+    }
+    return worst;
+  }
+
+  std::array<Sum, stages> slopes_{};
+  S h_{};
+  [[no_unique_address]] std::conditional_t<compensated, LowDigits<System>, Nothing> low_;
+  Drift<S> drift_;
+  S error_ = S(0);
+  S work_{};
+};
+
+/// Order 5 with an error of order 4: seven evaluations a step.
+template <HamiltonianSystem System>
+using Rkmk54 = Rkmk<System, DormandPrince54>;
+/// Order 8 with an error of order 7: thirteen evaluations a step.
+template <HamiltonianSystem System>
+using Rkmk87 = Rkmk<System, PrinceDormand87>;
+
+/// Commutator-free method of order 4: products of exponentials in place of brackets, two for the
+/// last half of a step (Celledoni, Marthinsen & Owren 2003).  Four evaluations a step; not
+/// symplectic.
+template <HamiltonianSystem System>
+class CommutatorFree4 {
+  using S = typename System::Scalar;
+  using Rate = typename System::Group::template Rate<S>;
+  using Slope = detail::Slope<System>;
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  static constexpr int order = 4;
+  static constexpr std::string_view name = "cf4";
+
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                         const S& h) noexcept {
+    const S half = S(0.5) * h;
+    const Slope one = detail::slope_of(system, state, t);
+    StateOf<System> there = moved(state, half, one);
+    const auto middle = there.motors;
+    const Slope two = detail::slope_of(system, there, t + half);
+    const Slope three = detail::slope_of(system, moved(state, half, two), t + half);
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = gp(middle[i], exp(h * three.rates[i] - half * one.rates[i]));
+      there.momenta[i] = mul_add(h, three.forces[i], state.momenta[i]);
+    }
+    const Slope four = detail::slope_of(system, there, t + h);
+
+    S worst(0);
+    for (std::size_t i = 0; i < n; ++i) {
+      const Rate inner = S(2) * (two.rates[i] + three.rates[i]);
+      auto& motor = state.motors[i];
+      motor = gp(motor, exp((h / S(12)) * (mul_add(S(3), one.rates[i], inner) - four.rates[i])));
+      motor = gp(motor, exp((h / S(12)) * (mul_add(S(3), four.rates[i], inner) - one.rates[i])));
+      const auto defect = unit_defect(motor);
+      worst = scalar::max_abs(worst, detail::size(defect));
+      motor = motor + unit_correction(motor, defect);
+      state.momenta[i] = mul_add(
+          h / S(6), mul_add(S(2), two.forces[i] + three.forces[i], one.forces[i] + four.forces[i]),
+          state.momenta[i]);
+    }
+    if constexpr (PoweredSystem<System>) {
+      work_ =
+          mul_add(h / S(6), mul_add(S(2), two.power + three.power, one.power + four.power), work_);
+    }
+    detail::record(drift_, worst);
+  }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return work_;
+  }
+
+ private:
+  [[nodiscard]] static constexpr StateOf<System> moved(const StateOf<System>& state, const S& h,
+                                                       const Slope& along) noexcept {
+    StateOf<System> there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = gp(state.motors[i], exp(h * along.rates[i]));
+      there.momenta[i] = mul_add(h, along.forces[i], state.momenta[i]);
+    }
+    return there;
+  }
+
+  Drift<S> drift_;
+  S work_{};
+};
+
+}  // namespace hamotor
