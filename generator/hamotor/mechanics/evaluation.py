@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from functools import lru_cache
 from typing import Any
 
@@ -19,15 +20,19 @@ Values = dict[Expr, Any]
 MOST_STEPS = 200
 """Of Newton's method; near its solution it needs five."""
 MOST_HALVINGS = 60
-DIGITS = 40
+DIGITS = 70
+"""Of momenta at the start, ten of them for rounding."""
 
 
 def values_of(parameters: Mapping[Expr, Any], time: Any = 0) -> Values:
     """Parameters and the time as numbers of mpmath's precision."""
-    return {TIME: mpmath.mpf(time)} | {s: _number(x) for s, x in parameters.items()}
+    return {TIME: mpmath.mpf(time)} | {s: number(x) for s, x in parameters.items()}
 
 
-def _number(value: Any) -> Any:
+def number(value: Any) -> Any:
+    """A number, a fraction or a rational of SymPy in mpmath's precision."""
+    if isinstance(value, Fraction):
+        return mpmath.mpf(value.numerator) / value.denominator
     if getattr(value, "is_Rational", False):
         return mpmath.mpf(int(value.p)) / int(value.q)
     return mpmath.mpf(value)
@@ -35,7 +40,7 @@ def _number(value: Any) -> Any:
 
 def place(body: Coordinates, motor: Numbers, known: Values) -> Values:
     """`known`, and where the body is: its motor, and the variables and points that follow."""
-    found = known | dict(zip(body.motor, map(mpmath.mpf, motor), strict=True))
+    found = known | dict(zip(body.motor, map(number, motor), strict=True))
     for variable in body.frame_variables:
         (found[variable.symbol],) = evaluated([variable.definition], found)
     for point in body.points:
@@ -50,7 +55,7 @@ def evaluated(expressions: Sequence[Expr], values: Values) -> list[Any]:
         found = _function(tuple(expressions), symbols)(*values.values())
     except (ZeroDivisionError, OverflowError):
         return [mpmath.nan] * len(expressions)
-    return [_number(x) if isinstance(x, int | sympy.Expr) else x for x in found]
+    return [number(x) if isinstance(x, int | sympy.Expr) else x for x in found]
 
 
 @lru_cache(maxsize=256)
@@ -127,16 +132,16 @@ def momentum_of_rates(
     motors: Sequence[Numbers],
     rates: Sequence[Numbers],
     time: float = 0,
-) -> tuple[tuple[float, ...], ...]:
-    """μ of each body for which ∂H/∂μ are these rates (physical, body frame).
+) -> tuple[tuple[Any, ...], ...]:
+    """μ of each body for which ∂H/∂μ are these rates (physical, body frame), to `DIGITS`.
 
     motors: the components of each body's M. UsageError where there is no such μ, or none is found.
     """
     bodies = hamiltonian.bodies
     momenta = [p for body in bodies for p in body.momenta]
-    wanted = [mpmath.mpf(x) for body_rates in rates for x in body_rates]
     slopes = [x for body_rates in hamiltonian.rates for x in body_rates]
     with mpmath.workdps(DIGITS):
+        wanted = [number(x) for body_rates in rates for x in body_rates]
         known = values_of(hamiltonian.parameters, time)
         for body, motor in zip(bodies, motors, strict=True):
             known = place(body, motor, known)
@@ -158,7 +163,7 @@ def momentum_of_rates(
             start = [mpmath.mpf(drawn.uniform(-1, 1) if attempt else 0) for _ in momenta]
             found = solved(residual, jacobian, start)
             if found is not None:
-                numbers = iter(float(x) for x in found)
+                numbers = iter(found)
                 return tuple(tuple(next(numbers) for _ in body.momenta) for body in bodies)
     shown = ", ".join(
         f"{symbol} = {float(x):g}"

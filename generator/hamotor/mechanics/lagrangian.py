@@ -21,10 +21,12 @@ import sympy
 from hamotor.errors import UsageError
 from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.evaluation import (
+    DIGITS,
     Numbers,
     Values,
     evaluated,
     is_real,
+    number,
     place,
     random_motor,
     solved,
@@ -124,12 +126,12 @@ class Lagrangian:
 
     def momentum_of_rates(
         self, motors: Sequence[Numbers], rates: Sequence[Numbers], time: float = 0
-    ) -> tuple[tuple[float, ...], ...]:
+    ) -> tuple[tuple[Any, ...], ...]:
         """μ = ∂L/∂B of each body, where its motor and its rates have these components."""
-        with mpmath.workdps(_DIGITS):
+        with mpmath.workdps(DIGITS):
             known = self._state(motors, rates, time)
             numbers = iter(evaluated(self.momenta, known))
-            return tuple(tuple(float(next(numbers)) for _ in body.rates) for body in self.bodies)
+            return tuple(tuple(next(numbers) for _ in body.rates) for body in self.bodies)
 
     def rates_of_momentum(
         self, motors: Sequence[Numbers], momenta: Sequence[Numbers], time: float = 0
@@ -158,7 +160,7 @@ class Lagrangian:
         known = values_of(self.parameters, time)
         for body, motor, body_rates in zip(self.bodies, motors, rates, strict=True):
             known = place(body, motor, known)
-            known |= dict(zip(body.rates, map(mpmath.mpf, body_rates), strict=True))
+            known |= dict(zip(body.rates, map(number, body_rates), strict=True))
         return known
 
     def require_hyperregular(

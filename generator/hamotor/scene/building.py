@@ -22,7 +22,8 @@ from hamotor.mechanics.evaluation import momentum_of_rates
 from hamotor.mechanics.hamiltonian import Hamiltonian
 from hamotor.mechanics.language import Body, Record, Vocabulary
 from hamotor.mechanics.vocabulary import Speaker, vocabulary
-from hamotor.scene.general import GeneralBody, GeneralScene, unit_deviation
+from hamotor.scene.exact import of_mpmath
+from hamotor.scene.general import GeneralBody, GeneralScene, exact, unit_deviation
 from hamotor.scene.groups import groups_in
 from hamotor.scene.model import Output, Time
 
@@ -106,7 +107,8 @@ def general_scene(
         raise UsageError("give momenta or rates, not both")
     if momenta is None:
         moving = [_row(r, generators, {}) for r in rates or [{}] * len(bodies)]
-        given = momentum_of_rates(hamiltonian, at, moving)
+        found = momentum_of_rates(hamiltonian, list(map(exact, at)), list(map(exact, moving)))
+        given = tuple(tuple(map(of_mpmath, momentum)) for momentum in found)
     else:
         given = tuple(_row(m, generators, {}) for m in momenta)
     spec = bundled_algebra(first.algebra.name)

@@ -7,7 +7,7 @@ bodies of its own in the runtime, or has forques that no potential has.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hamotor.codegen.algebra import Algebra, reverse_sign
 from hamotor.scene.conserved import ConservedQuantity
-from hamotor.scene.exact import decimal
+from hamotor.scene.exact import decimal, rounded, with_digits
 from hamotor.scene.groups import Group
 from hamotor.scene.model import Output, Time
 from hamotor.scene.motors import Vector
@@ -90,6 +90,11 @@ class GeneralScene:
         return np.array([x for body in self.bodies for x in (*body.motor, *body.momentum)])
 
     @cached_property
+    def exact_state(self) -> Exact:
+        """The same as the numbers that these stand for, to `exact.DIGITS`."""
+        return exact([x for body in self.bodies for x in (*body.motor, *body.momentum)])
+
+    @cached_property
     def system(self) -> System:
         """The programs of the Hamiltonian."""
         from hamotor.mechanics.system import System
@@ -112,14 +117,19 @@ class GeneralScene:
 # ---------------------------------------------------------------- motors
 
 
-def product(algebra: Algebra, a: Mapping[int, float], b: Mapping[int, float]) -> dict[int, float]:
-    """Geometric product of multivectors of floats; each component is summed once."""
-    terms: dict[int, list[float]] = {}
+def product(
+    algebra: Algebra,
+    a: Mapping[int, Any],
+    b: Mapping[int, Any],
+    total: Callable[[list[Any]], Any] = math.fsum,
+) -> dict[int, Any]:
+    """Geometric product of multivectors; `total` adds what makes a component."""
+    terms: dict[int, list[Any]] = {}
     for blade_a, x in a.items():
         for blade_b, y in b.items():
             for blade, z in algebra.blade_product(blade_a, blade_b).items():
-                terms.setdefault(blade, []).append(x * y * float(z))
-    return {blade: math.fsum(values) for blade, values in terms.items()}
+                terms.setdefault(blade, []).append(x * y * z)
+    return {blade: total(values) for blade, values in terms.items()}
 
 
 def motor_of(
@@ -131,35 +141,37 @@ def motor_of(
     """
     algebra, space = coordinates.algebra, coordinates.space
     planes = ("e12",) if len(rotor) == 2 else ("e23", "e31", "e12")
-    turned: dict[int, float] = {0: rotor[0]}
-    for name, x in zip(planes, rotor[1:], strict=True):
+    one = Fraction(1)
+    turned = {0: decimal(rotor[0])}
+    for name, r in zip(planes, exact(rotor[1:]), strict=True):
         blade, sign = algebra.parse_blade(name)
-        turned[blade] = sign * x
-    moved: dict[int, float] = {0: 1.0}
+        turned[blade] = sign * r
+    moved = {0: one}
     if space.origin is not None:
         # T = 1 − ½ x_i e0∧e_i, in the null basis 1 − ½ x_i e_i∧e∞.
         other = space.origin if space.at_infinity is None else space.at_infinity
-        for direction, x in zip(space.directions, position, strict=False):
-            moved[1 << direction | 1 << other] = -0.5 * x
-    grown: dict[int, float] = {0: 1.0}
+        for direction, x in zip(space.directions, exact(position), strict=False):
+            moved[1 << direction | 1 << other] = -x / 2
+    grown = {0: one}
     if space.origin is not None and space.at_infinity is not None:
         # S = exp(½ ln s e0∧e∞), whose square is 1.
-        half = math.log(scale) / 2
+        (root,) = with_digits(lambda s: s**0.5, decimal(scale))
         grown = {
-            0: math.cosh(half),
-            1 << space.origin | 1 << space.at_infinity: math.sinh(half),
+            0: (root + 1 / root) / 2,
+            1 << space.origin | 1 << space.at_infinity: (root - 1 / root) / 2,
         }
-    whole = product(algebra, product(algebra, moved, turned), grown)
+    whole = product(algebra, product(algebra, moved, turned, sum), grown, sum)
     element = coordinates.group.element
-    motor = tuple(
-        math.fsum(float(x) * whole.get(blade, 0.0) for blade, x in reading.items()) + 0.0
+    motor = [
+        sum((Fraction(y) * whole.get(blade, 0) for blade, y in reading.items()), Fraction(0))
         for reading in element.reading
-    )
+    ]
     for x, component in zip(motor, element.components, strict=True):
         for blade, y in component.embedding.items():
-            whole[blade] = whole.get(blade, 0.0) - x * float(y)
-    size = max(1.0, *map(abs, motor))
-    return motor if max(map(abs, whole.values())) <= 1e-12 * size else None
+            whole[blade] = whole.get(blade, 0) - x * y
+    size = max(1.0, *(abs(float(x)) for x in motor))
+    reached = max(map(abs, whole.values())) <= 1e-12 * size
+    return tuple(map(rounded, motor)) if reached else None
 
 
 def unit_deviation(coordinates: Coordinates, motor: Sequence[float]) -> float:
@@ -171,7 +183,7 @@ def unit_deviation(coordinates: Coordinates, motor: Sequence[float]) -> float:
     back = {blade: reverse_sign(blade) * x for blade, x in whole.items()}
     square = product(coordinates.algebra, whole, back)
     square[0] = square.get(0, 0.0) - 1.0
-    return max(abs(x) for x in square.values())
+    return max(abs(float(x)) for x in square.values())
 
 
 def exact(numbers: Sequence[float]) -> Exact:

@@ -22,6 +22,7 @@ from hamotor.mechanics.lagrangian import Lagrangian, NotHyperregular
 from hamotor.mechanics.language import Vector, read_number, read_vector
 from hamotor.mechanics.vocabulary import Speaker, vocabulary
 from hamotor.scene import schema
+from hamotor.scene.exact import of_mpmath
 from hamotor.scene.general import (
     GeneralBody,
     GeneralScene,
@@ -538,7 +539,7 @@ def _damping(table: Table, system: _System, _number_of: int) -> None:
     )
 
 
-MomentaOfRates = Callable[[Any, Any], tuple[tuple[float, ...], ...]]
+MomentaOfRates = Callable[[Any, Any], tuple[tuple[Any, ...], ...]]
 
 
 def _started(
@@ -549,11 +550,11 @@ def _started(
     rates = [_rates(draft) for draft in drafts]
     if any(momentum is None for momentum in given):
         try:
-            found = momenta_of([draft.motor for draft in drafts], rates)
+            found = momenta_of([exact(draft.motor) for draft in drafts], list(map(exact, rates)))
         except UsageError as error:
             top.fail(f"{error}; give momenta")
         given = [
-            its_own if its_own is not None else of_rates
+            its_own if its_own is not None else tuple(map(of_mpmath, of_rates))
             for its_own, of_rates in zip(given, found, strict=True)
         ]
     return tuple(

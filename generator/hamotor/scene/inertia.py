@@ -21,7 +21,7 @@ from fractions import Fraction
 import numpy as np
 from numpy.typing import NDArray
 
-from hamotor.scene.exact import decimal, rounded_once
+from hamotor.scene.exact import decimal, rounded, rounded_once
 from hamotor.scene.motors import Matrix, Vector
 
 RELATIVE_ZERO = 1e-13
@@ -32,7 +32,7 @@ RELATIVE_EQUALITY = 1e-9
 
 def diagonal(moments: Sequence[float]) -> Matrix:
     """The tensor with these principal moments along the body's axes."""
-    a, b, c = (float(x) for x in moments)
+    a, b, c = moments
     return ((a, 0.0, 0.0), (0.0, b, 0.0), (0.0, 0.0, c))
 
 
@@ -40,8 +40,8 @@ def _uniform(mass: float, lengths: Sequence[float], divisor: int) -> Matrix:
     """Moments mass·(b² + c²)/divisor about each axis; in the plane the one about the third."""
     squares = [decimal(x) ** 2 for x in lengths]
     if len(squares) == 2:
-        return ((float(decimal(mass) * sum(squares) / divisor),),)
-    return diagonal([float(decimal(mass) * (sum(squares) - x) / divisor) for x in squares])
+        return ((rounded(decimal(mass) * sum(squares) / divisor),),)
+    return diagonal([rounded(decimal(mass) * (sum(squares) - x) / divisor) for x in squares])
 
 
 def box(mass: float, sides: Sequence[float]) -> Matrix:
@@ -56,7 +56,7 @@ def ellipsoid(mass: float, semi_axes: Sequence[float]) -> Matrix:
 
 def cylinder(mass: float, radius: float, height: float) -> Matrix:
     """Uniform cylinder about the third axis. kg m²."""
-    across = float(decimal(mass) * (3 * decimal(radius) ** 2 + decimal(height) ** 2) / 12)
+    across = rounded(decimal(mass) * (3 * decimal(radius) ** 2 + decimal(height) ** 2) / 12)
     return diagonal((across, across, rounded_once((0.5, mass, radius, radius))))
 
 
@@ -84,12 +84,12 @@ def of_points(
         for i in axes
     ]
     trace = sum(second[k][k] for k in axes)
-    tensor: Matrix = ((float(trace),),)
+    tensor: Matrix = ((rounded(trace),),)
     if len(axes) == 3:
         tensor = tuple(
-            tuple(float((trace if i == j else 0) - second[i][j]) for j in axes) for i in axes
+            tuple(rounded((trace if i == j else 0) - second[i][j]) for j in axes) for i in axes
         )
-    return float(mass), tuple(float(x) for x in center), tensor
+    return rounded(mass), tuple(map(rounded, center)), tensor
 
 
 def about_origin(mass: float, center: Sequence[float], tensor: Matrix) -> NDArray[np.float64]:
@@ -98,6 +98,24 @@ def about_origin(mass: float, center: Sequence[float], tensor: Matrix) -> NDArra
     if len(tensor) == 1:
         return np.array(tensor) + mass * float(c @ c)
     return np.array(tensor) + mass * (float(c @ c) * np.eye(3) - np.outer(c, c))
+
+
+def exactly_about_origin(
+    mass: float, center: Sequence[float], tensor: Matrix
+) -> list[list[Fraction]]:
+    """The same of the numbers that these stand for."""
+    c = [decimal(x) for x in center]
+    square = sum((x * x for x in c), Fraction(0))
+    axes = range(len(tensor))
+    if len(tensor) == 1:
+        return [[decimal(tensor[0][0]) + decimal(mass) * square]]
+    return [
+        [
+            decimal(tensor[i][j]) + decimal(mass) * ((square if i == j else 0) - c[i] * c[j])
+            for j in axes
+        ]
+        for i in axes
+    ]
 
 
 def kinetic_matrix(

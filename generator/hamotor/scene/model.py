@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from hamotor.scene import inertia
 from hamotor.scene.conserved import ConservedQuantity, conserved_quantities
-from hamotor.scene.exact import decimal
+from hamotor.scene.exact import decimal, rounded
 from hamotor.scene.groups import Group
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
 from hamotor.scene.motors import Matrix, Vector, cross, motor_of, rotation_matrix
@@ -153,6 +154,11 @@ class Scene:
         """Per body its motor's and then its momentum's components, in the user's body frame."""
         return np.array([x for body in self.bodies for x in (*body.motor, *body.momentum)])
 
+    @cached_property
+    def exact_state(self) -> tuple[Fraction, ...]:
+        """The same as the numbers that these stand for, to `exact.DIGITS`."""
+        return tuple(decimal(x) for body in self.bodies for x in (*body.motor, *body.momentum))
+
     @property
     def principal(self) -> tuple[PrincipalFrame, ...]:
         """The principal frame of each body."""
@@ -179,7 +185,7 @@ class Scene:
     def gravity(self) -> Vector | None:
         """The sum of all gravities, world frame, m/s²; None where it vanishes."""
         fields = [i.acceleration for i in self.interactions if isinstance(i, Gravity)]
-        total = tuple(float(sum(map(decimal, g))) for g in zip(*fields, strict=True))
+        total = tuple(rounded(sum(map(decimal, g), Fraction(0))) for g in zip(*fields, strict=True))
         return total if any(total) else None
 
     @property

@@ -10,15 +10,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.scene import inertia
+from hamotor.scene.exact import DIGITS, decimal, exactly, with_digits
 from hamotor.scene.motors import (
     Matrix,
+    Square,
     Vector,
     motor_of,
+    nearest_rotation,
     quaternion_of_matrix,
     rotation_matrix,
     rotor_of_quaternion,
@@ -55,19 +60,24 @@ class PrincipalFrame:
         if self.is_body_frame:
             return tuple(float(x) for x in point)
         relative = np.array(point, dtype=float) - np.array(self.center)
-        return tuple(float(x) for x in self.axes.T @ relative)
+        exact = [decimal(x) - decimal(c) for x, c in zip(point, self.center, strict=True)]
+        axes = rotation_matrix([decimal(x) for x in self.rotor])
+        return tuple(
+            exactly(float(x), sum((a * y for a, y in zip(axis, exact, strict=True)), Fraction(0)))
+            for x, axis in zip(self.axes.T @ relative, axes.T, strict=True)
+        )
 
 
-def principal_axes(tensor: NDArray[np.float64]) -> tuple[Vector, Vector]:
+def principal_axes(tensor: Square) -> tuple[Vector, Vector]:
     """Principal moments and the rotor of a symmetric (3, 3) tensor.
 
     A diagonal tensor keeps its axes exactly. Otherwise each principal axis takes the place and the
     direction of the body axis it lies closest to, so that the choice depends on nothing else.
     """
-    off_diagonal = tensor - np.diag(np.diag(tensor))
-    if not off_diagonal.any():
-        return tuple(float(x) for x in np.diag(tensor)), (1.0, 0.0, 0.0, 0.0)
-    moments, vectors = np.linalg.eigh(tensor)
+    matrix = np.array(tensor)
+    if not (matrix - np.diag(np.diag(matrix))).any():
+        return tuple(tensor[k][k] for k in range(3)), (1.0, 0.0, 0.0, 0.0)
+    moments, vectors = np.linalg.eigh(matrix)
     moments = _equal_where_rounding_parts_them(moments)
     order = max(
         itertools.permutations(range(3)),
@@ -78,8 +88,52 @@ def principal_axes(tensor: NDArray[np.float64]) -> tuple[Vector, Vector]:
     if np.linalg.det(axes) < 0:
         least_aligned = int(np.argmin(np.abs(np.diag(axes))))
         axes[:, least_aligned] *= -1.0
-    rotor = rotor_of_quaternion(quaternion_of_matrix(axes))
-    return tuple(float(moments[k]) for k in order), rotor
+    rows = nearest_rotation(tuple(tuple(float(x) for x in row) for row in axes))
+    exact_moments, exact_axes = _diagonalised(tensor, rows)
+    axes_of_digits = tuple(
+        tuple(exactly(float(x), y) for x, y in zip(row, exact_row, strict=True))
+        for row, exact_row in zip(axes, exact_axes, strict=True)
+    )
+    rotor = rotor_of_quaternion(quaternion_of_matrix(axes_of_digits))
+    found = zip((moments[k] for k in order), exact_moments, strict=True)
+    return tuple(exactly(float(x), y) for x, y in found), rotor
+
+
+def _diagonalised(
+    tensor: Square, axes: Square
+) -> tuple[tuple[Fraction, ...], tuple[tuple[Fraction, ...], ...]]:
+    """Principal moments and axes (columns) to all digits, from axes that are right to a double's.
+
+    Jacobi's rotations, which leave alone what is equal.
+    """
+
+    def turned(*entries: Any) -> list[Any]:
+        import mpmath
+
+        a, r = (
+            mpmath.matrix([entries[k + 3 * i : k + 3 * i + 3] for i in range(3)]) for k in (0, 9)
+        )
+        a = r.T * a * r
+        negligible = mpmath.norm(a) * mpmath.mpf(10) ** -DIGITS
+        for _ in range(6):
+            for i, j in ((0, 1), (1, 2), (0, 2)):
+                if abs(a[i, j]) <= negligible:
+                    continue
+                angle = mpmath.atan2(2 * a[i, j], a[i, i] - a[j, j]) / 2
+                angle -= mpmath.pi * mpmath.nint(2 * angle / mpmath.pi) / 2
+                turn = mpmath.eye(3)
+                turn[i, i] = turn[j, j] = mpmath.cos(angle)
+                turn[j, i] = mpmath.sin(angle)
+                turn[i, j] = -turn[j, i]
+                a, r = turn.T * a * turn, r * turn
+        moments = [a[k, k] for k in range(3)]
+        for i, j in ((0, 1), (1, 2), (0, 2)):
+            if abs(moments[i] - moments[j]) <= negligible:
+                moments[j] = moments[i]
+        return [*moments, *r]
+
+    flat = with_digits(turned, *(decimal(x) for m in (tensor, axes) for row in m for x in row))
+    return flat[:3], (flat[3:6], flat[6:9], flat[9:])
 
 
 def _equal_where_rounding_parts_them(moments: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -100,13 +154,20 @@ def principal_frame(
     is a fixed point, and the parallel-axis theorem moves the tensor there.
     """
     if len(tensor) == 1:
-        origin = tuple(float(x) for x in center)
+        origin = tuple(center)
         return PrincipalFrame(
             mass, (tensor[0][0],), motor_of(origin, (1.0, 0.0)), origin, (1.0, 0.0)
         )
     if translates:
-        moments, rotor = principal_axes(np.array(tensor))
-        origin = tuple(float(x) for x in center)
+        moments, rotor = principal_axes(tensor)
+        origin = tuple(center)
         return PrincipalFrame(mass, moments, motor_of(origin, rotor), origin, rotor)
-    moments, rotor = principal_axes(inertia.about_origin(mass, center, tensor))
+    about = zip(
+        inertia.about_origin(mass, center, tensor),
+        inertia.exactly_about_origin(mass, center, tensor),
+        strict=True,
+    )
+    moments, rotor = principal_axes(
+        tuple(tuple(map(exactly, map(float, row), exact)) for row, exact in about)
+    )
     return PrincipalFrame(mass, moments, rotor, (0.0, 0.0, 0.0), rotor)

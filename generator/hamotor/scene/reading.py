@@ -17,6 +17,7 @@ import numpy as np
 from hamotor.codegen.spec import bundled_algebras
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
+from hamotor.scene.exact import decimal, rounded, written
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
@@ -25,6 +26,7 @@ from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
     Matrix,
     Vector,
+    nearest_rotation,
     quaternion_of_matrix,
     rotor_of_angle,
     rotor_of_axis_angle,
@@ -246,7 +248,7 @@ def _toml(contents: bytes, file: str) -> dict[str, Any]:
         line = text.count("\n", 0, long_key.start()) + 1
         raise UsageError(f"{file}: line {line}: a key of more than {MOST_KEY_PARTS} parts")
     try:
-        return tomllib.loads(text)
+        return tomllib.loads(text, parse_float=written)
     except RecursionError:
         raise UsageError(f"{file}: is not valid TOML: brackets are nested too deeply") from None
     except ValueError as error:
@@ -394,7 +396,10 @@ def _symmetric(table: Table, matrix: Matrix) -> Matrix:
                     f" and row {i + 1}, column {j + 1} is {matrix[i][j]:g}",
                     "inertia",
                 )
-    return tuple(tuple((matrix[i][j] + matrix[j][i]) / 2 for j in range(3)) for i in range(3))
+    return tuple(
+        tuple(rounded((decimal(matrix[i][j]) + decimal(matrix[j][i])) / 2) for j in range(3))
+        for i in range(3)
+    )
 
 
 def _orientation(table: Table) -> Vector:
@@ -422,15 +427,15 @@ def _orientation(table: Table) -> Vector:
             )
             given.fail(f"must be a unit quaternion, but its norm is {norm:.9g}{hint}", "quaternion")
         return rotor_of_quaternion(q)
-    matrix = np.array(given.matrix("matrix"))
+    rows = given.matrix("matrix")
+    matrix = np.array(rows)
     with np.errstate(over="ignore"):
         deviation = float(np.abs(matrix @ matrix.T - np.eye(3)).max())
     if not deviation <= UNIT_TOLERANCE:
         given.fail(f"must be orthogonal, but R R^T differs from 1 by {deviation:.3g}", "matrix")
     if np.linalg.det(matrix) < 0:
         given.fail("must be a rotation, but its determinant is -1: it is a reflection", "matrix")
-    left, _, right = np.linalg.svd(matrix)
-    return rotor_of_quaternion(quaternion_of_matrix(left @ right))
+    return rotor_of_quaternion(quaternion_of_matrix(nearest_rotation(rows)))
 
 
 def _interactions(top: Table, bodies: tuple[Body, ...], most: int) -> tuple[Interaction, ...]:

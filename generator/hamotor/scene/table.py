@@ -8,9 +8,11 @@ import re
 import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any, NoReturn
 
 from hamotor.errors import UsageError, suggest
+from hamotor.scene.exact import rounded
 from hamotor.scene.groups import Group
 from hamotor.scene.motors import Matrix, Vector
 from hamotor.scene.schema import LARGEST, NAME_PATTERN, Section
@@ -118,7 +120,9 @@ class Table:
             self.fail(f"must be finite, not {value!r}", name)
         if abs(value) > LARGEST:
             self.fail(f"must lie within ±{LARGEST:g}, so that nothing overflows", name)
-        return float(value)
+        if value == 0:
+            return 0.0
+        return value if isinstance(value, float) else rounded(Fraction(value))
 
     def number(self, name: str) -> float:
         """A finite number of the kind the schema asks for."""
@@ -131,7 +135,7 @@ class Table:
             self.fail(f"must be at least {1 / LARGEST:g}, so that nothing overflows", name)
         if kind == "non-negative" and number < 0:
             self.fail(f"must not be negative: {number:g}", name)
-        return number + 0.0
+        return number
 
     def integer(self, name: str) -> int:
         """An integer, at least 1."""
@@ -155,7 +159,7 @@ class Table:
         if not isinstance(value, list) or len(value) != length:
             self.fail(f"must be {length} numbers, {what}, not {kind_of(value)}", name)
         return tuple(
-            self._number(x, f"{name}: number {k} of {length}") + 0.0 for k, x in enumerate(value, 1)
+            self._number(x, f"{name}: number {k} of {length}") for k, x in enumerate(value, 1)
         )
 
     def vector(self, name: str) -> Vector:
@@ -186,9 +190,7 @@ class Table:
             shown = ", ".join(["[..]"] * size) if size <= 4 else "[..], …"
             self.fail(f"must be a {size}x{size} matrix [{shown}], not {kind_of(rows)}", name)
         return tuple(
-            tuple(
-                self._number(x, f"{name}: row {i}, column {j}") + 0.0 for j, x in enumerate(row, 1)
-            )
+            tuple(self._number(x, f"{name}: row {i}, column {j}") for j, x in enumerate(row, 1))
             for i, row in enumerate(rows, 1)
         )
 

@@ -46,13 +46,13 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr int series_terms() noexcept {
   // the remainder after n terms is about 1/(2n + 2)!
-  S factorial(1);
+  double rest = 8;
+  for (int digit = 1; digit < Limits<S>::digits; ++digit) rest *= 2;
   int n = 1;
-  for (; n < 40; ++n) {
-    factorial = factorial * S((2 * n + 1) * (2 * n + 2));
-    if (S(1) / factorial < Limits<S>::epsilon() / S(8)) break;
+  for (;; ++n) {
+    rest /= (2 * n + 1) * (2 * n + 2);
+    if (rest < 1) return n;
   }
-  return n;
 }
 
 /// Horner's scheme for cosh √(S + W) and sinh √(S + W) / √(S + W) in the ring of x + y W.

@@ -162,7 +162,7 @@ class Gauss {
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
   static constexpr std::size_t n = System::bodies;
-  static constexpr auto table = detail::gauss_table<S, stages>();
+  static inline const auto table = detail::gauss_table<S, stages>();
   static constexpr int most_iterations = 100;
 
  public:

@@ -70,7 +70,8 @@ template <std::size_t N, class S, class Derivatives>
                                                          const Derivatives& derivatives,
                                                          std::array<S, N> guess = {}) noexcept {
   constexpr int most_evaluations = 100;
-  constexpr S negligible = scalar::power_of_two<S>(-(scalar::Limits<S>::digits + 6));
+  const S negligible =
+      scalar::constant([] { return scalar::power_of_two<S>(-(scalar::Limits<S>::digits + 6)); });
   const auto missing = [&](const LegendreDerivatives<N, S>& now) {
     std::array<S, N> rest{};
     for (std::size_t i = 0; i < N; ++i) rest[i] = momentum[i] - now.momentum[i];

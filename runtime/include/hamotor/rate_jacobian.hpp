@@ -76,10 +76,11 @@ inline constexpr int series_limit = 16;
 /// Terms that bring Σ (±16)^n / (2n + 3)! below an eighth of an ulp of its value.
 template <class S>
 [[nodiscard]] constexpr int jacobian_terms() noexcept {
-  S term(1);
+  double term = 64;
+  for (int digit = 1; digit < Limits<S>::digits; ++digit) term *= 2;
   int n = 0;
-  while (n < 60 && term > Limits<S>::epsilon() / S(64)) {
-    term = term * S(series_limit) / S((2 * n + 4) * (2 * n + 5));
+  while (term > 1) {
+    term *= static_cast<double>(series_limit) / ((2 * n + 4) * (2 * n + 5));
     ++n;
   }
   return n;

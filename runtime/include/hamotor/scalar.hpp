@@ -1,18 +1,44 @@
 // The scalar operations that generated kernels are written in.
 //
-// Kernels are templates over a scalar S: float, double, long double, __float128, an exact integer
-// or rational, a pack of lanes.  Everything they need beyond + - * / stands here, once, so that a
-// scalar type is adapted in one place.
+// Kernels are templates over a scalar S: float, double, long double, __float128, MPFR's numbers
+// (mpfr.hpp), an exact integer or rational, a pack of lanes.  Everything they need beyond + - * /
+// stands here, once, so that a scalar type is adapted in one place.
 #pragma once
 
+#include <cfloat>
 #include <cmath>
 #include <concepts>
+#include <cstddef>
 #include <limits>
+#include <string_view>
 #include <type_traits>
 
-#if defined(__SIZEOF_FLOAT128__) && __has_include(<quadmath.h>)
-#include <quadmath.h>
+#if defined(__SIZEOF_FLOAT128__) && LDBL_MANT_DIG != 113
 #define HAMOTOR_HAS_QUADMATH 1
+#if __has_include(<quadmath.h>)
+#include <quadmath.h>
+#else
+// clang does not see the header, which is g++'s own, but links with the library.
+extern "C" {
+__extension__ __float128 sqrtq(__float128) noexcept;
+__extension__ __float128 sinq(__float128) noexcept;
+__extension__ __float128 cosq(__float128) noexcept;
+__extension__ __float128 tanq(__float128) noexcept;
+__extension__ __float128 sinhq(__float128) noexcept;
+__extension__ __float128 coshq(__float128) noexcept;
+__extension__ __float128 tanhq(__float128) noexcept;
+__extension__ __float128 asinhq(__float128) noexcept;
+__extension__ __float128 expq(__float128) noexcept;
+__extension__ __float128 logq(__float128) noexcept;
+__extension__ __float128 asinq(__float128) noexcept;
+__extension__ __float128 acosq(__float128) noexcept;
+__extension__ __float128 atanq(__float128) noexcept;
+__extension__ __float128 atan2q(__float128, __float128) noexcept;
+__extension__ __float128 fmaq(__float128, __float128, __float128) noexcept;
+__extension__ __float128 strtoflt128(const char*, char**) noexcept;
+int quadmath_snprintf(char*, std::size_t, const char*, ...) noexcept;
+}
+#endif
 #endif
 
 /// Marks a function that is always inlined where the compiler optimises.
@@ -177,6 +203,10 @@ template <class S>
 template <class S>
 struct Limits : std::numeric_limits<S> {};
 
+/// Whether squares of numbers and of their inverses overflow only where nothing is meant by them.
+template <class S>
+inline constexpr bool has_boundless_exponents = Limits<S>::max_exponent > (1 << 20);
+
 #ifdef HAMOTOR_HAS_QUADMATH
 __extension__ using Float128 = __float128;
 
@@ -202,18 +232,120 @@ template <>
 struct Limits<Float128> {
   static constexpr int digits = 113;
   static constexpr int max_exponent = 16384;
+  static constexpr Float128 epsilon() noexcept { return Float128(0x1p-112L); }
   static constexpr Float128 max() noexcept {
-    Float128 largest = Float128(2) - epsilon();
-    for (int i = 1; i < max_exponent; ++i) largest = largest * 2;
-    return largest;
-  }
-  static constexpr Float128 epsilon() noexcept {
-    Float128 x = 1;
-    for (int i = 1; i < digits; ++i) x = x / 2;
-    return x;
+    return (Float128(2) - epsilon()) * Float128(0x1p+16383L);
   }
 };
 #endif
+
+namespace detail {
+
+template <class Make>
+inline constexpr bool is_made_by_compiler =
+    requires { typename std::bool_constant<(static_cast<void>(Make{}()), true)>; };
+
+template <class S>
+struct Two {
+  constexpr S operator()() const noexcept { return S(1) + S(1); }
+};
+
+template <class Make>
+[[nodiscard]] const auto& made_once() noexcept {
+  static const auto value = Make{}();
+  return value;
+}
+
+}  // namespace detail
+
+/// What a lambda without captures makes: by the compiler, or once at run time for numbers that it
+/// cannot calculate with (MPFR's).
+template <class Make>
+[[nodiscard]] constexpr auto constant(const Make&) noexcept {
+  if constexpr (detail::is_made_by_compiler<Make>) {
+    constexpr auto value = Make{}();
+    return value;
+  } else {
+    return detail::made_once<Make>();
+  }
+}
+
+/// Whether the compiler calculates with numbers of this type.
+template <class S>
+inline constexpr bool is_literal = detail::is_made_by_compiler<detail::Two<S>>;
+
+namespace detail {
+
+/// 10^n, exact while 5^n has no more digits than S.
+template <class S>
+[[nodiscard]] constexpr S power_of_ten(int n) noexcept {
+  S result(1);
+  for (; n > 0; --n) result = result * S(10);
+  return result;
+}
+
+}  // namespace detail
+
+/// The number that a decimal stands for, [-]digits[.digits][E[-]digits], within a unit in the last
+/// place of __float128: of its first 60 digits.  Wider scalars bring a `from_text` of their own.
+template <class S>
+[[nodiscard]] constexpr S decimal(std::string_view text) noexcept {
+  constexpr int piece = 30;  // 10^30 < 2^113
+  const bool negative = text.front() == '-';
+  S high(0);
+  S low(0);
+  int digits = 0;
+  int scale = 0;
+  bool fraction = false;
+  std::size_t at = negative ? 1 : 0;
+  for (; at < text.size() && text[at] != 'e' && text[at] != 'E'; ++at) {
+    if (text[at] == '.') {
+      fraction = true;
+      continue;
+    }
+    S& part = digits < piece ? high : low;
+    if (digits < 2 * piece) {
+      part = part * S(10) + S(text[at] - '0');
+      scale -= fraction ? 1 : 0;
+      digits += digits > 0 || text[at] != '0' ? 1 : 0;
+    } else {
+      scale += fraction ? 0 : 1;
+    }
+  }
+  if (at < text.size()) {
+    int exponent = 0;
+    const bool down = text[at + 1] == '-';
+    for (at += down || text[at + 1] == '+' ? 2 : 1; at < text.size(); ++at) {
+      exponent = 10 * exponent + (text[at] - '0');
+    }
+    scale += down ? -exponent : exponent;
+  }
+  S value = high;
+  if (digits > piece) {
+    // Joined below the point, where both are as wide as S at most.
+    value = high + low / detail::power_of_ten<S>(digits - piece);
+    scale += digits - piece;
+  }
+  constexpr int most = 48;  // 5^48 < 2^113
+  for (; scale > most; scale -= most) value = value * detail::power_of_ten<S>(most);
+  for (; scale < -most; scale += most) value = value / detail::power_of_ten<S>(most);
+  value =
+      scale < 0 ? value / detail::power_of_ten<S>(-scale) : value * detail::power_of_ten<S>(scale);
+  return negative ? -value : value;
+}
+
+/// A constant of generated code: `rounded` where S has no more digits than long double, or else
+/// what `Text{}()`, its decimal, stands for.
+template <class S, class Text>
+[[nodiscard]] constexpr S number(long double rounded, const Text&) noexcept {
+  if constexpr (Limits<S>::digits <= std::numeric_limits<long double>::digits) {
+    return static_cast<S>(rounded);
+  } else if constexpr (is_literal<S>) {
+    return constant([] { return decimal<S>(Text{}()); });
+  } else {
+    return constant([] { return S::from_text(Text{}()); });
+  }
+}
 
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S abs(const S& x) noexcept {
@@ -255,8 +387,10 @@ template <class S, std::same_as<S>... Rest>
 /// π, correctly rounded to S.
 template <class S>
 [[nodiscard]] constexpr S pi() noexcept {
-  // Three doubles, of which the first two are exact in 106 bits.
-  if constexpr (Limits<S>::digits > std::numeric_limits<long double>::digits) {
+  if constexpr (requires { S::pi(); }) {
+    return S::pi();
+  } else if constexpr (Limits<S>::digits > std::numeric_limits<long double>::digits) {
+    // Three doubles, of which the first two are exact in 106 bits.
     return S(0x1.921fb54442d18p+1L) + S(0x1.1a62633145c07p-53L) - S(0x1.f1976b7ed8fbcp-109L);
   } else {
     return S(3.141592653589793238462643383279502884L);
@@ -286,21 +420,25 @@ struct Scaling {
 /// The scaling for numbers of which `largest` has the largest absolute value; denormal or not.
 template <class S>
 [[nodiscard]] constexpr Scaling<S> scaling(const S& largest) noexcept {
-  constexpr int half = Limits<S>::max_exponent / 2;
-  constexpr int shrink = half + 4;
-  constexpr int grow = half + 2 * Limits<S>::digits;
-  constexpr S large = power_of_two<S>(half - 4);
-  constexpr S small = power_of_two<S>(12 - half);
-  constexpr Scaling<S> from_large{power_of_two<S>(-shrink), power_of_two<S>(shrink),
-                                  power_of_two<S>(-shrink / 2), power_of_two<S>(shrink / 2)};
-  constexpr Scaling<S> from_small{power_of_two<S>(grow), power_of_two<S>(-grow),
-                                  power_of_two<S>(grow / 2), power_of_two<S>(-grow / 2)};
-  const auto choose = [&](const S& if_large, const S& if_small) {
-    return select(largest > large, if_large, select(largest < small, if_small, S(1)));
-  };
-  return {choose(from_large.in, from_small.in), choose(from_large.out, from_small.out),
-          choose(from_large.root_in, from_small.root_in),
-          choose(from_large.root_out, from_small.root_out)};
+  if constexpr (has_boundless_exponents<S>) {
+    return {S(1), S(1), S(1), S(1)};
+  } else {
+    constexpr int half = Limits<S>::max_exponent / 2;
+    constexpr int shrink = half + 4;
+    constexpr int grow = half + 2 * Limits<S>::digits;
+    constexpr S large = power_of_two<S>(half - 4);
+    constexpr S small = power_of_two<S>(12 - half);
+    constexpr Scaling<S> from_large{power_of_two<S>(-shrink), power_of_two<S>(shrink),
+                                    power_of_two<S>(-shrink / 2), power_of_two<S>(shrink / 2)};
+    constexpr Scaling<S> from_small{power_of_two<S>(grow), power_of_two<S>(-grow),
+                                    power_of_two<S>(grow / 2), power_of_two<S>(-grow / 2)};
+    const auto choose = [&](const S& if_large, const S& if_small) {
+      return select(largest > large, if_large, select(largest < small, if_small, S(1)));
+    };
+    return {choose(from_large.in, from_small.in), choose(from_large.out, from_small.out),
+            choose(from_large.root_in, from_small.root_in),
+            choose(from_large.root_out, from_small.root_out)};
+  }
 }
 
 /// √(x² + y²), whose squares neither overflow nor vanish.
@@ -387,9 +525,13 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr DoubleWord<S> double_word_scaled(const DoubleWord<S>& x,
                                                          const S& power) noexcept {
-  constexpr S largest = Limits<S>::max();
   const S hi = x.hi * power;
-  return {select(hi > largest, largest, hi), x.lo * power};
+  if constexpr (has_boundless_exponents<S>) {
+    return {hi, x.lo * power};
+  } else {
+    constexpr S largest = Limits<S>::max();
+    return {select(hi > largest, largest, hi), x.lo * power};
+  }
 }
 
 /// 1 / x of a double-word number, to about twice the working precision.

@@ -362,8 +362,8 @@ class Splitting {
     Momenta momenta{};
   };
   static constexpr bool compensated = summation == Summation::compensated;
-  static constexpr auto weights = detail::rounded_weights<S, Scheme>();
-  static constexpr bool opens_with_kick = weights.kicks[0] > S(0);
+  static inline const auto weights = detail::rounded_weights<S, Scheme>();
+  static constexpr bool opens_with_kick = detail::rounded_weights<double, Scheme>().kicks[0] > 0;
 
   constexpr void kick(Momenta& momenta, const S& by) const noexcept {
     for (std::size_t i = 0; i < n; ++i) {
