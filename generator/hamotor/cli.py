@@ -180,11 +180,18 @@ def _parser() -> _Parser:
         help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
     )
     bench = command("bench", "measure speed and error against other libraries", _bench)
-    bench.add_argument("what", metavar="kernels|steps", nargs="?", default="kernels")
-    bench.add_argument("scenes", metavar="SCENE", nargs="*", help="for steps: which scenes")
+    bench.add_argument("what", metavar="kernels|steps|precision", nargs="?", default="kernels")
+    bench.add_argument(
+        "scenes", metavar="SCENE", nargs="*", help="for steps and precision: which scenes"
+    )
     bench.add_argument("--quick", action="store_true", help="fewer repetitions, double only")
     bench.add_argument("--out", metavar="DIR", help="where to write (default: runs/bench)")
     bench.add_argument("--json", action="store_true", help="print the account, not the table")
+    bench.add_argument(
+        "--with-peers",
+        action="store_true",
+        help="for precision: install heyoka, SciPy and MuJoCo first, to measure beside",
+    )
     return parser
 
 
@@ -545,13 +552,13 @@ def _test(parsed: argparse.Namespace) -> int:
 
 
 def _bench(parsed: argparse.Namespace) -> int:
-    benchmarks = ("kernels", "steps")
+    benchmarks = ("kernels", "steps", "precision")
     if parsed.what not in benchmarks:
         raise UsageError(
             f'no benchmark "{parsed.what}"; there are {", ".join(benchmarks)}.'
             f"{suggest(parsed.what, benchmarks)}"
         )
-    from hamotor.bench import bench_kernels, bench_steps
+    from hamotor.bench import bench_kernels, bench_precision, bench_steps
 
     out = Path(parsed.out) if parsed.out else Path("runs") / "bench"
     if out.exists() and not out.is_dir():
@@ -559,8 +566,17 @@ def _bench(parsed: argparse.Namespace) -> int:
     if parsed.what == "steps":
         bench_steps(parsed.scenes, out, json=parsed.json, quick=parsed.quick)
         return 0
+    if parsed.what == "precision":
+        bench_precision(
+            parsed.scenes,
+            out,
+            json=parsed.json,
+            quick=parsed.quick,
+            with_peers=parsed.with_peers,
+        )
+        return 0
     if parsed.scenes:
-        raise UsageError("bench kernels takes no scenes; bench steps does.")
+        raise UsageError("bench kernels takes no scenes; bench steps and bench precision do.")
     bench_kernels(out, json=parsed.json, quick=parsed.quick)
     return 0
 

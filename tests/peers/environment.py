@@ -1,6 +1,7 @@
 """Where the peers are installed: an environment of their own, apart from what Hamotor needs.
 
 `python -m tests.peers.environment` installs them; `./hamotor test --with-peers` does so first.
+Public solvers to measure beside have another one, `python -m tests.peers.environment solvers`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ INSTALL = "./hamotor test --with-peers"
 PYTHON = FOLDER / "python" / "bin" / "python"
 NODE_MODULES = FOLDER / "node" / "node_modules"
 _PYTHON_PINS = (HERE / "requirements.txt",)
+_SOLVER_PINS = (ROOT / "tests" / "bench" / "precision" / "requirements.txt",)
 _NODE_PINS = (HERE / "package.json", HERE / "package-lock.json")
 
 
@@ -39,23 +41,35 @@ def install() -> list[str]:
     FOLDER.mkdir(parents=True, exist_ok=True)
     with (FOLDER / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        return [*_install_python(), *_install_node()]
+        return [
+            *([] if has_python_peers() else _install_python("python", _PYTHON_PINS)),
+            *_install_node(),
+        ]
 
 
-def _install_python() -> list[str]:
-    if has_python_peers():
-        return []
-    folder = FOLDER / "python"
+def install_solvers() -> list[str]:
+    """The same for the public solvers that `./hamotor bench precision` measures beside."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with (FOLDER / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        done = _stamp("solvers") == _digest(_SOLVER_PINS)
+        return [] if done else _install_python("solvers", _SOLVER_PINS)
+
+
+def _install_python(part: str, pins: tuple[Path, ...]) -> list[str]:
+    folder = FOLDER / part
     shutil.rmtree(folder, ignore_errors=True)
-    pip = (str(PYTHON), "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    python = str(folder / "bin" / "python")
+    pip = (python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
+    names = ", ".join(p.partition("==")[0] for p in pins[0].read_text(encoding="utf-8").split())
     return _run_all(
-        "clifford, kingdon and galgebra",
+        names,
         (
             (sys.executable, "-m", "venv", str(folder)),
-            (*pip, "--only-binary=:all:", "--requirement", str(_PYTHON_PINS[0])),
+            (*pip, "--only-binary=:all:", "--requirement", str(pins[0])),
         ),
         folder,
-        _PYTHON_PINS,
+        pins,
     )
 
 
@@ -95,5 +109,6 @@ def _stamp(part: str) -> str:
 
 
 if __name__ == "__main__":
-    if problems := install():
+    asked = install_solvers if sys.argv[1:] == ["solvers"] else install
+    if problems := asked():
         sys.exit("\n".join(problems))

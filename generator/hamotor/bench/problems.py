@@ -1,0 +1,165 @@
+"""Scenes to measure steppers on, what their exact end is, and how public solvers are given them."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from hamotor.bench import endpoint
+from hamotor.bench.endpoint import Endpoint
+from hamotor.errors import UsageError
+from hamotor.run.simulation import Simulation, load
+from hamotor.scene import Scene
+
+ROOT: Final = Path(__file__).resolve().parents[3]
+SCENES: Final = ROOT / "tests" / "bench" / "problems"
+REFERENCES: Final = ROOT / "tests" / "references"
+TARGETS: Final = (1e-4, 1e-6, 1e-8, 1e-10, 1e-12)
+
+GOALS: Final[Mapping[str, tuple[float | None, ...]]] = {
+    "P1": (1.6, 1.9, 1.8, 1.4, None),
+    "P2": (300, 11, 3.9, 2.7, None),
+    "P3": (11, 6.7, 4.1, 2.2, 1.8),
+    "P3b": (12, 7.6, 4.4, 2.6, 2.0),
+    "P4": (1.75, 2.2, 2.0, 2.2, 4.7),
+}
+"""How many times faster than the best public solver to be at each of `TARGETS`, as prototypes were;
+None where no public solver gets there."""
+
+_ORDERS_OF_REFERENCES: Final = (("splitting10", "splitting8"), ("gauss8", "gauss6"))
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The exact end of a problem, as far as it is known."""
+
+    end: Endpoint
+    source: str
+    certificate: str
+    """How it was checked, and to what."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A scene from its start to its end."""
+
+    name: str
+    simulation: Simulation
+
+    @cached_property
+    def scene(self) -> Any:
+        """What the simulation was made from."""
+        assert self.simulation.read is not None
+        return self.simulation.read()
+
+    @cached_property
+    def reference(self) -> Reference:
+        """From `tests/references`, or else computed in long double by two methods."""
+        file = REFERENCES / f"{self.name}.json"
+        if file.is_file() and isinstance(self.scene, Scene):
+            return _from_digits(file, self.scene)
+        return _computed(self.simulation)
+
+    @cached_property
+    def for_peers(self) -> Mapping[str, Any] | str:
+        """The numbers that public solvers are given, or why they are not."""
+        return _for_peers(self.scene)
+
+
+def problem(name: str) -> Problem:
+    """One of the benchmark's own problems, a bundled scene or a scene file.  Raises UsageError."""
+    own = SCENES / f"{name}.toml"
+    return Problem(Path(name).stem, load(own if own.is_file() else name))
+
+
+def own_problems() -> list[str]:
+    """Names of the problems that have scenes of their own."""
+    return sorted(file.stem for file in SCENES.glob("*.toml"))
+
+
+def _from_digits(file: Path, scene: Scene) -> Reference:
+    said = json.loads(file.read_text(encoding="utf-8"))
+    last = said["checkpoints"][-1]
+    if last["t"] != scene.time.end:
+        raise UsageError(f"{file.name} ends at {last['t']} s, the scene at {scene.time.end} s")
+    state = [*last["q"], *last["w"], *last.get("x", ()), *last.get("v", ())]
+    return Reference(
+        endpoint.of_quaternion(scene, state, said["energy0"]),
+        f"tests/references/{file.name}: {said['method'].split(';')[0]}",
+        f"two orders, differing by {said['crosscheck_max_abs_diff']}",
+    )
+
+
+def _computed(simulation: Simulation) -> Reference:
+    offered = simulation.methods
+    methods = next(
+        (pair for pair in _ORDERS_OF_REFERENCES if set(pair) <= set(offered)),
+        ("rkmk4", "rkmk54"),
+    )
+    step = simulation.step or simulation.end / 1000
+    ends, finer = [], 1 if offered[methods[0]] >= 8 else 8
+    for method, factor in zip(methods, (finer, 2 * finer), strict=True):
+        library = simulation.compile(scalar="long_double", method=method).library
+        steps = math.ceil(simulation.end / step) * factor
+        with library.start(method, step=simulation.end / steps, state=simulation.state) as live:
+            live.advance(steps, 0, None)
+            ends.append(endpoint.of_row(library.description, live.observe_wide()))
+    apart = endpoint.errors(ends[0], ends[1])
+    shown = ", ".join(f"{name} {distance:.1e}" for name, distance in apart.items())
+    return Reference(
+        ends[1],
+        f"{methods[1]} in long double",
+        f"{methods[0]} with twice the step differs: {shown}",
+    )
+
+
+def _for_peers(scene: Any) -> Mapping[str, Any] | str:
+    if not isinstance(scene, Scene) or scene.group.dimension != 3 or scene.group.scales:
+        return "only rigid bodies in space are formulated for them"
+    if len(scene.bodies) != 1:
+        return "only one body is formulated for them"
+    (body,) = scene.bodies
+    others = [i for i in scene.interactions if type(i).__name__ not in {"Gravity", "Spring"}]
+    gravity = scene.gravity or (0.0, 0.0, 0.0)
+    moves = body.group.translates
+    tensor = np.array(body.kinetic_matrix[:3, :3])
+    center = body.center_of_mass
+    springs = scene.springs
+    if others or len(springs) > 1 or any(gravity[:2]) or gravity[2] > 0:
+        return "only gravity downwards and one spring are formulated for them"
+    if np.any(tensor - np.diag(np.diag(tensor))) or any(center[: 3 if moves else 2]):
+        return "only bodies in their principal axes are formulated for them"
+    if any(any(s.anchor or (1,)) for s in springs) or (springs and not moves):
+        return "only springs from the world's origin to a free body are formulated for them"
+    kind = "free"
+    if springs:
+        kind = "loose" if springs[0].rest_length else "sprung"
+    elif any(gravity):
+        if moves:
+            return "a falling body is not formulated for them"
+        kind = "top"
+    s, e23, e31, e12 = body.rotor
+    state = [s, -e23, -e31, -e12, *body.rate[:3]]
+    if springs:
+        rotation = body.in_world((1, 0, 0)), body.in_world((0, 1, 0)), body.in_world((0, 0, 1))
+        axes = np.array(rotation) - np.array(body.position)
+        state += [*body.position, *(axes.T @ body.rate[3:])]
+    return {
+        "kind": kind,
+        "moments": [float(x) for x in np.diag(tensor)],
+        "mass": body.mass,
+        "gravity": -gravity[2],
+        "height": center[2],
+        "stiffness": springs[0].stiffness if springs else 0.0,
+        "rest_length": springs[0].rest_length if springs else 0.0,
+        "at": list(springs[0].at) if springs else [0.0, 0.0, 0.0],
+        "end": scene.time.end,
+        "state": [float(x) for x in state],
+    }

@@ -1,0 +1,145 @@
+"""Times contestants in one process: `-m tests.bench.precision.stopwatch JOB` writes rows of JSON.
+
+A contestant is a list of settings from coarse to fine.  Each setting runs once, until two in a row
+take longer than the contestant may; then rounds go over all contestants of a problem, so that what
+else runs on the machine disturbs all alike.  Runs in the peers' environment and needs nothing of
+Hamotor.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from tests.bench.precision import peers
+
+_BATCH_S = 3e-4
+"""Shorter runs are repeated until they take this long."""
+_LARGEST_BATCH = 10
+
+
+class CompiledScene:
+    """A scene's library with one method; settings are {calls, step, tolerance}."""
+
+    set_up_s = 0.0
+
+    def __init__(self, setting: Mapping[str, Any], said: Mapping[str, Any], loop: str) -> None:
+        scene = ctypes.CDLL(said["library"])
+        self._functions = [
+            ctypes.cast(getattr(scene, f"hamotor_{name}"), ctypes.c_void_p)
+            for name in ("start", "advance", "observe", "steps", "stop")
+        ]
+        self._scene = scene
+        self._time = ctypes.CDLL(loop).time_runs
+        self._time.restype = ctypes.c_int64
+        self._setting, self._method = setting, said["method"].encode()
+        self._state = (ctypes.c_double * len(said["state"]))(*said["state"])
+        self._columns = said["columns"]
+
+    def run(self, repetitions: int) -> peers.Result:
+        """Integrate from the start `repetitions` times."""
+        seconds = (ctypes.c_double * repetitions)()
+        row = (ctypes.c_double * self._columns)()
+        steps = ctypes.c_int64()
+        calls = int(self._setting["calls"])
+        done = self._time(
+            *self._functions, self._method, ctypes.c_double(self._setting["step"]),
+            ctypes.c_double(self._setting["tolerance"]), self._state, ctypes.c_int64(calls),
+            ctypes.c_int64(repetitions), seconds, row, ctypes.byref(steps),
+        )  # fmt: skip
+        if done < calls:
+            raise peers.Refused(f"not finite after {done} of {calls} steps")
+        return peers.Result(list(seconds), list(row), steps.value, None)
+
+
+class Entry:
+    """One setting of one contestant, and what was seen of it."""
+
+    def __init__(self, contestant: int, setting: int, timed: Any) -> None:
+        self.contestant, self.setting, self.timed = contestant, setting, timed
+        self.seconds: list[float] = []
+        self.last: peers.Result | None = None
+
+    def run(self) -> None:
+        """Once, or in a batch where it is short."""
+        known = min(self.seconds, default=_BATCH_S)
+        batch = min(max(int(_BATCH_S / max(known, 1e-9)), 1), _LARGEST_BATCH)
+        self.last = self.timed.run(batch)
+        self.seconds += self.last.seconds
+
+    def row(self) -> dict[str, Any]:
+        """What is written of it."""
+        assert self.last is not None
+        return {
+            "contestant": self.contestant,
+            "setting": self.setting,
+            "best_s": min(self.seconds),
+            "median_s": median(self.seconds),
+            "worst_s": max(self.seconds),
+            "runs": len(self.seconds),
+            "set_up_s": self.timed.set_up_s,
+            "final": self.last.state,
+            "steps": self.last.steps,
+            "evaluations": self.last.evaluations,
+        }
+
+
+def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """What each setting gave, and what failed, problem by problem."""
+    for name, said in job["problems"].items():
+        problem = peers.Problem(said) if said else None
+        entries = []
+        for index, contestant in enumerate(job["contestants"]):
+            if contestant["problem"] != name:
+                continue
+            slow = 0
+            for number, setting in enumerate(contestant["settings"]):
+                try:
+                    entry = Entry(index, number, _timed(job, contestant, setting, problem))
+                    entry.run()
+                    if min(entry.seconds) > contestant["longest_s"]:
+                        entry.run()  # it may have been disturbed
+                except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
+                    yield {"contestant": index, "setting": number, "failure": str(problem_met)}
+                    continue
+                entries.append(entry)
+                slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
+                if slow == 2:
+                    break
+        for _ in range(job["rounds"]):
+            for entry in entries:
+                if len(entry.seconds) < 3 or sum(entry.seconds) < job["enough_s"]:
+                    entry.run()
+        for entry in entries:
+            yield entry.row()
+
+
+def _timed(
+    job: Mapping[str, Any],
+    contestant: Mapping[str, Any],
+    setting: Any,
+    problem: peers.Problem | None,
+) -> Any:
+    if contestant["kind"] == "scene":
+        return CompiledScene(setting, contestant, job["loop"])
+    return peers.MAKERS[contestant["kind"]](problem, setting, **contestant["options"])
+
+
+def main() -> None:
+    """Read the job and write its rows; or only which peers there are, without a job."""
+    if len(sys.argv) < 2:
+        found = {name: peers.version(name) for name in ("heyoka", "scipy", "mujoco")}
+        print(json.dumps({"python": sys.version.split()[0], **found}))
+        return
+    job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    for row in rows(job):
+        print(json.dumps(row), flush=True)
+
+
+if __name__ == "__main__":
+    main()

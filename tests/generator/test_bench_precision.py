@@ -1,0 +1,104 @@
+"""The benchmark of precision: what it compares is the same motion, and what it counts is met."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tests.bench.precision import peers
+
+from hamotor.bench import endpoint
+from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
+from hamotor.bench.precision import Extent, measure
+from hamotor.bench.precision_report import best, table
+from hamotor.bench.problems import REFERENCES, Problem, own_problems, problem
+
+
+@pytest.mark.parametrize("name", own_problems())
+def test_public_solvers_are_given_the_motion_of_the_reference(name: str) -> None:
+    given = problem(name).for_peers
+    assert not isinstance(given, str)
+    one = peers.Problem(given)
+    first = json.loads((REFERENCES / f"{name}.json").read_text(encoding="utf-8"))["checkpoints"][0]
+    state, steps = np.array(one.state), 4000
+    h = first["t"] / steps
+
+    def rate(x: Any) -> Any:
+        return np.array(peers.rates(one, x.tolist()))
+
+    for _ in range(steps):
+        k1 = rate(state)
+        k2 = rate(state + h / 2 * k1)
+        k3 = rate(state + h / 2 * k2)
+        k4 = rate(state + h * k3)
+        state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    expected = [*first["q"], *first["w"], *first.get("x", ()), *first.get("v", ())]
+    assert state == pytest.approx([float(x) for x in expected], abs=2e-5)
+
+
+@pytest.mark.parametrize("name", own_problems())
+def test_the_energy_of_a_scene_is_that_of_its_reference(name: str) -> None:
+    one = problem(name)
+    state = one.for_peers["state"]  # type: ignore[index]
+    start = endpoint.of_quaternion(one.scene, state)
+    assert endpoint.errors(start, one.reference.end)[ENERGY] < 1e-14 * abs(
+        float(one.reference.end[ENERGY][0, 0])
+    )
+    assert one.scene.initial_energy[0] + one.scene.initial_energy[1] == pytest.approx(
+        float(start[ENERGY][0, 0]), rel=1e-14
+    )
+
+
+def test_an_error_is_an_angle_and_a_distance() -> None:
+    scene = problem("P4").scene
+    turned = [np.cos(5e-9), 0, 0, np.sin(5e-9), 0, 0, 0, 3, 4, 0, 0, 0, 0]
+    still = [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
+    here, there = (endpoint.of_quaternion(scene, state) for state in (turned, still))
+    found = endpoint.errors(here, there)
+    assert found[ATTITUDE] == pytest.approx(1e-8, rel=1e-6)
+    assert found[POSITION] == pytest.approx(5)
+
+
+def _rows(errors: Sequence[float], microseconds: Sequence[float]) -> list[Mapping[str, Any]]:
+    return [
+        {
+            "problem": "p", "contestant": "m", "family": "hamotor", "form": "", "compiler": "",
+            "failure": None, "errors": {ATTITUDE: e}, "best_us": t,
+        }
+        for e, t in zip(errors, microseconds, strict=True)
+    ]  # fmt: skip
+
+
+def test_a_setting_counts_only_if_the_next_two_finer_ones_meet_the_target() -> None:
+    rows = _rows([1e-7, 1e-3, 1e-5, 1e-7, 1e-8], [1, 2, 4, 8, 16])
+    found = best(rows, "p", 1e-4, ours=True)
+    assert found is not None
+    assert found.microseconds == 4
+    assert best(rows, "p", 1e-6, ours=True) is None
+    assert best(rows, "p", 1e-4, ours=False) is None
+
+
+@pytest.mark.slow
+def test_a_methods_settings_are_timed_from_coarse_to_fine() -> None:
+    one = problem("planar")
+    simulation = replace(one.simulation, methods={"splitting8": 8, "splitting10": 10})
+    extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++", "clang++")[:1])
+    account = measure([Problem("planar", simulation)], extent, {}, {})
+    assert "space" in account["not_there"]["public solvers on planar"]
+    for method in simulation.methods:
+        rows = [r for r in account["rows"] if r["contestant"] == method]
+        steps = [row["setting"] for row in rows]
+        assert steps == sorted(steps, reverse=True)
+        errors = [row["errors"][POSITION] for row in rows if row["failure"] is None]
+        assert min(errors) < 1e-3 * max(errors)
+        assert all(0 < row["best_us"] <= row["median_us"] <= row["worst_us"] for row in rows)
+    assert "planar" in table(account)
+
+
+def test_the_problems_are_named_as_their_references() -> None:
+    assert own_problems() == sorted(Path(file).stem for file in REFERENCES.glob("*.json"))
