@@ -47,6 +47,7 @@ The folder then holds run.json (the account of the run), trajectory/ (Parquet), 
 conserved.png.  An earlier run there is replaced, anything else is left alone.
 """
 
+_BENCHMARKS = ("kernels", "steps", "precision", "stability")
 _COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test", "bench")
 _LATER_RUN_OPTIONS = {
     "ensemble": "--ensemble",
@@ -180,11 +181,11 @@ def _parser() -> _Parser:
         help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
     )
     bench = command("bench", "measure speed and error against other libraries", _bench)
-    bench.add_argument("what", metavar="kernels|steps|precision", nargs="?", default="kernels")
+    bench.add_argument("what", metavar="|".join(_BENCHMARKS), nargs="?", default="kernels")
     bench.add_argument(
-        "scenes", metavar="SCENE", nargs="*", help="for steps and precision: which scenes"
+        "scenes", metavar="SCENE", nargs="*", help="which scenes; for stability: which cases"
     )
-    bench.add_argument("--quick", action="store_true", help="fewer repetitions, double only")
+    bench.add_argument("--quick", action="store_true", help="fewer repetitions, scalars or methods")
     bench.add_argument("--out", metavar="DIR", help="where to write (default: runs/bench)")
     bench.add_argument("--json", action="store_true", help="print the account, not the table")
     bench.add_argument(
@@ -552,13 +553,12 @@ def _test(parsed: argparse.Namespace) -> int:
 
 
 def _bench(parsed: argparse.Namespace) -> int:
-    benchmarks = ("kernels", "steps", "precision")
-    if parsed.what not in benchmarks:
+    if parsed.what not in _BENCHMARKS:
         raise UsageError(
-            f'no benchmark "{parsed.what}"; there are {", ".join(benchmarks)}.'
-            f"{suggest(parsed.what, benchmarks)}"
+            f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)}.'
+            f"{suggest(parsed.what, _BENCHMARKS)}"
         )
-    from hamotor.bench import bench_kernels, bench_precision, bench_steps
+    from hamotor.bench import bench_kernels, bench_precision, bench_stability, bench_steps
 
     out = Path(parsed.out) if parsed.out else Path("runs") / "bench"
     if out.exists() and not out.is_dir():
@@ -575,8 +575,11 @@ def _bench(parsed: argparse.Namespace) -> int:
             with_peers=parsed.with_peers,
         )
         return 0
+    if parsed.what == "stability":
+        found = bench_stability(parsed.scenes, out, json=parsed.json, quick=parsed.quick)
+        return 1 if found["failed"] else 0
     if parsed.scenes:
-        raise UsageError("bench kernels takes no scenes; bench steps and bench precision do.")
+        raise UsageError("bench kernels takes no scenes; the other benchmarks do.")
     bench_kernels(out, json=parsed.json, quick=parsed.quick)
     return 0
 

@@ -112,7 +112,10 @@ def test_a_rejected_text_exits_with_4(
     ("words", "message"),
     [
         ("rnu", 'unknown command "rnu".*Did you mean "run"'),
-        ("bench kernel", 'no benchmark "kernel"; there are kernels, steps, precision. Did you'),
+        (
+            "bench kernel",
+            'no benchmark "kernel"; there are kernels, steps, precision, stability. Did',
+        ),
         ("run", "SCENE"),
         ("run toy --stpe 1", 'unknown option --stpe. Did you mean "--step"'),
         ("run toy --step 0", 'greater than zero, not "0"'),

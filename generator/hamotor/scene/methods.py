@@ -20,6 +20,18 @@ class Form(Flag):
     """Matrices in place of motors."""
 
 
+class Promise(Flag):
+    """What every step of a method holds, whatever its length."""
+
+    NOTHING = 0
+    MOMENTA = auto()
+    """Spatial momenta that no forque changes, and Casimirs of free bodies, but for rounding."""
+    SYMPLECTIC = auto()
+    """The canonical structure of T*G, so that the energy error stays bounded."""
+    SYMMETRIC = auto()
+    """A step back undoes a step, but for rounding."""
+
+
 @dataclass(frozen=True)
 class Method:
     """A one-step method, and the forms of a scene that it steps."""
@@ -28,27 +40,35 @@ class Method:
     order: int
     description: str
     forms: Form
+    promises: Promise = Promise.NOTHING
     error_controlled: bool = False
     """Whether it chooses its steps where it is given a local tolerance."""
 
 
 ANY = Form.SPLIT | Form.GENERAL
+ALL = Promise.MOMENTA | Promise.SYMPLECTIC | Promise.SYMMETRIC
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
-    Method("rkmk54", 5, "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit", ANY, True),
-    Method("rkmk87", 8, "the same by Prince & Dormand's pair", ANY, True),
+    Method(
+        "rkmk54",
+        5,
+        "Runge-Kutta-Munthe-Kaas by Dormand & Prince's pair, explicit",
+        ANY,
+        error_controlled=True,
+    ),
+    Method("rkmk87", 8, "the same by Prince & Dormand's pair", ANY, error_controlled=True),
     Method("cf4", 4, "commutator-free, explicit: two exponentials in place of brackets", ANY),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
-    Method("splitting2", 2, "Strang splitting, symplectic, keeps coadjoint orbits", Form.SPLIT),
-    Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT),
-    Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT),
-    Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT),
-    Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT),
-    Method("lie_midpoint", 2, "midpoint rule on the group, implicit, symplectic for any H", ANY),
-    Method("gauss4", 4, "Gauss collocation on the group, the same with 2 stages", ANY),
-    Method("gauss6", 6, "the same with 3 stages", ANY),
-    Method("gauss8", 8, "the same with 4 stages", ANY),
+    Method("splitting2", 2, "Strang splitting, symplectic, keeps orbits", Form.SPLIT, ALL),
+    Method("splitting4", 4, "the same in 5 or 6 parts a step", Form.SPLIT, ALL),
+    Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT, ALL),
+    Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT, ALL),
+    Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT, ALL),
+    Method("lie_midpoint", 2, "midpoint rule, symplectic for any H, implicit", ANY, ALL),
+    Method("gauss4", 4, "Gauss collocation, the same with 2 stages", ANY, ALL),
+    Method("gauss6", 6, "the same with 3 stages", ANY, ALL),
+    Method("gauss8", 8, "the same with 4 stages", ANY, ALL),
 )
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
 """What a scene may ask for."""
