@@ -153,8 +153,11 @@ def test_the_api_does_what_the_readme_promises() -> None:
 def test_a_scene_is_compiled_with_the_one_method_it_is_run_with() -> None:
     simulation = hamotor.load("heavy_top")
     compiled = simulation.compile(method="splitting6")
-    assert compiled.description.methods == simulation.methods, "the runtime and the list agree"
-    chosen = {m.name for m in METHODS if m.error_controlled and m.forms & Form.SPLIT}
+    # The recurrence for Taylor series is written for that method only (test_taylor.py).
+    listed = {name: order for name, order in simulation.methods.items() if name != "taylor"}
+    assert compiled.description.methods == listed, "the runtime and the list agree"
+    split = [m for m in METHODS if m.forms & Form.SPLIT and m.name in listed]
+    chosen = {m.name for m in split if m.error_controlled}
     assert compiled.description.error_controlled == chosen
     state = simulation.state
     with compiled.library.start("splitting6", step=0.01, state=state) as live:

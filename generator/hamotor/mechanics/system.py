@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -74,9 +74,12 @@ class System:
         definitions = [(s, name, _folded(x, values)) for s, name, x in stages]
         return straight_line(folded, self.names, definitions)
 
-    def of(self, outputs: Mapping[str, Expr]) -> Program:
-        """A program for other functions of the state and the time."""
-        return self._program(outputs)
+    def of(self, outputs: Mapping[str, Expr], between: Sequence[Definition] = ()) -> Program:
+        """A program for other functions of the state and the time.
+
+        between: what else they are written in, besides where the bodies are.
+        """
+        return self._program(outputs, list(between))
 
     @cached_property
     def energy(self) -> Program:
@@ -91,12 +94,12 @@ class System:
     @cached_property
     def gradient(self) -> Program:
         """B and F of every body: outputs `rate{k}.NAME` and `forque{k}.NAME`."""
-        return self._program(self._rates | self._forques, self._pulls)
+        return self._program(self._rates | self.forques, self.pulls)
 
     @cached_property
     def forque(self) -> Program:
         """F of every body: outputs `forque{k}.NAME`."""
-        return self._program(self._forques, self._pulls)
+        return self._program(self.forques, self.pulls)
 
     @cached_property
     def _rates(self) -> dict[str, Expr]:
@@ -108,7 +111,7 @@ class System:
         }
 
     @cached_property
-    def _pulls(self) -> list[Definition]:
+    def pulls(self) -> list[Definition]:
         """Gradients at points, in the world and then in the body frame."""
         found: list[Definition] = []
         for k, body in enumerate(self.hamiltonian.bodies):
@@ -128,7 +131,8 @@ class System:
         return found
 
     @cached_property
-    def _forques(self) -> dict[str, Expr]:
+    def forques(self) -> dict[str, Expr]:
+        """F of every body, in what `pulls` define: `forque{k}.NAME`."""
         h = self.hamiltonian
         outputs = {}
         for k, body in enumerate(h.bodies):

@@ -94,7 +94,8 @@ class Simulation:
                 raise UsageError(f"{self.name}: has no matrix form.")
             source = self.matrix_source(scalar)
         else:
-            source = self.source(kernels, scalar)
+            own_text = (method,) if method == "taylor" else ()
+            source = self.source(kernels, scalar, *own_text)
         if method is not None and self.methods:
             check_method(method, self.offered(kernels, representation))
             source = f'#define HAMOTOR_METHOD "{method}"\n{source}'

@@ -21,6 +21,7 @@ from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Scene
 from hamotor.scene.source import literal_text, rendered, shortened, text_literal
+from hamotor.scene.taylor_source import refusal, required
 
 
 @dataclass(frozen=True)
@@ -61,10 +62,13 @@ class ProgramText:
         ]
 
 
-def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> str:
+def general_source(
+    whole: Scene | GeneralScene, kernels: str, scalar: str, method: str | None = None
+) -> str:
     """The text of the C++ file that defines a scene over the runtime's headers.
 
     kernels: `generated`, or `generic`: products by table, of dense multivectors.
+    method: the one that it is for.
 
     ValueError if its programs are not those of its Hamiltonian: a defect of ours.
     """
@@ -105,6 +109,7 @@ def general_source(whole: Scene | GeneralScene, kernels: str, scalar: str) -> st
         group_type=group_type,
         bodies=[text_literal(body.name) for body in scene.bodies],
         **own_system,
+        recurrence=_recurrence(scene, method, by_name),
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
         motor_units=[text_literal(motor_unit(scene, name)) for name in scene.group.motor],
         momentum_units=[text_literal(unit) for unit in scene.group.units],
@@ -185,6 +190,15 @@ def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
         },
         "power": None if scene.hamiltonian.conservative else ProgramText(system.power),
     }
+
+
+def _recurrence(scene: GeneralScene, method: str | None, by_name: bool) -> str | None:
+    """The recurrence for Taylor coefficients, for the method that needs it."""
+    if method != "taylor":
+        return None
+    if scene.lagrangian is not None:
+        raise refusal(scene.name, "the rates of this Lagrangian are found by Newton's method")
+    return required(scene.system, scene.name, by_name=by_name)
 
 
 def _lagrangian(lagrangian: Lagrangian, group_type: str, by_name: bool) -> dict[str, Any]:

@@ -69,6 +69,9 @@ METHODS = (
     Method("gauss4", 4, "Gauss collocation, the same with 2 stages", ANY, ALL),
     Method("gauss6", 6, "the same with 3 stages", ANY, ALL),
     Method("gauss8", 8, "the same with 4 stages", ANY, ALL),
+    Method(
+        "taylor", 21, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
+    ),
 )
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
 """What a scene may ask for."""

@@ -20,10 +20,14 @@ SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
 
 
 def scene_source(
-    scene: Scene | GeneralScene, kernels: str = "generated", scalar: str = "double"
+    scene: Scene | GeneralScene,
+    kernels: str = "generated",
+    scalar: str = "double",
+    method: str | None = None,
 ) -> str:
     """The text of the C++ file that defines `scene` over the runtime's headers.
 
+    method: the one that it is for; "taylor" has a text of its own, which nothing else needs.
     Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
     for numbers that do not fit the scalar.
     """
@@ -35,7 +39,7 @@ def scene_source(
     if not isinstance(scene, Scene) or kernels == "generic":
         from hamotor.scene.general_source import general_source
 
-        return general_source(scene, kernels, scalar)
+        return general_source(scene, kernels, scalar, method)
     if scalar == "float":
         _refuse_numbers_beyond_float(scene)
     suffix = SCALARS[scalar]
@@ -49,7 +53,16 @@ def scene_source(
         interactions=_interactions(scene, suffix),
         potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
+        recurrence=_recurrence(scene) if method == "taylor" else None,
     )
+
+
+def _recurrence(scene: Scene) -> str:
+    """The recurrence for Taylor coefficients.  UsageError where the motion is not analytic."""
+    from hamotor.scene.principal_system import principal_system
+    from hamotor.scene.taylor_source import required
+
+    return required(principal_system(scene), scene.name, by_name=False)
 
 
 def rendered(template: str, **values: Any) -> str:

@@ -8,6 +8,7 @@
 #include "hamotor/rkmk.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
+#include "hamotor/taylor.hpp"
 
 namespace hamotor {
 
@@ -28,10 +29,20 @@ struct Steppers<System> {
                  Gauss4<System>, Gauss6<System>, Gauss8<System>>;
 };
 
+template <class System>
+struct SeriesSteppers {
+  using type = std::tuple<>;
+};
+template <AnalyticSystem System>
+struct SeriesSteppers<System> {
+  using type = std::tuple<Taylor<System>>;
+};
+
 }  // namespace detail
 
 /// The steppers that a system can be stepped with.
 template <class System>
-using SteppersOf = typename detail::Steppers<System>::type;
+using SteppersOf = decltype(std::tuple_cat(typename detail::Steppers<System>::type{},
+                                           typename detail::SeriesSteppers<System>::type{}));
 
 }  // namespace hamotor

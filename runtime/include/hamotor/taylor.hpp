@@ -1,0 +1,281 @@
+// Taylor series of the motion, by recurrences that the generator derives for a scene.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <string_view>
+
+#include "hamotor/scalar.hpp"
+#include "hamotor/state.hpp"
+#include "hamotor/steppers.hpp"
+
+namespace hamotor {
+
+/// Where the recurrence for the Taylor coefficients of a system is declared: a scene specialises
+/// it.
+template <class System>
+struct RecurrenceOf {};
+
+/// A system with a recurrence for the Taylor coefficients of its motion.
+template <class System>
+concept AnalyticSystem = HamiltonianSystem<System> && requires {
+  { RecurrenceOf<System>::coordinates } -> std::convertible_to<std::size_t>;
+};
+
+/// The motion expanded in a Taylor series whose length and reach follow from a tolerance.
+///
+/// Order p = 1 − ½ ln ε for a relative error ε per unit of time, and the step as long as the last
+/// three coefficients allow (Jorba & Zou 2005). The polynomial of a step is dense output: what is
+/// asked for within its reach is evaluated, whatever the step asked for. Steps are increments with
+/// compensated sums. Without a tolerance, that of the scalar.
+template <AnalyticSystem System>
+class Taylor {
+  using S = typename System::Scalar;
+  using Recurrence = RecurrenceOf<System>;
+  using Coordinates = typename Recurrence::Coordinates;
+  static constexpr std::size_t n = Recurrence::coordinates;
+  static constexpr std::size_t bodies = System::bodies;
+  /// Lanes in a block of sums, which registers hold.
+  static constexpr std::size_t block = 16;
+  static constexpr std::size_t lanes = (Recurrence::lanes + block - 1) / block * block;
+  static constexpr bool is_powered = requires { Recurrence::work; };
+
+ public:
+  /// The highest order: that for full precision.
+  static constexpr int order = 2 + (scalar::Limits<S>::digits * 35 + 99) / 100;
+  static constexpr std::string_view name = "taylor";
+
+  /// Asks for this local error a unit of time, s⁻¹, relative to motors and momenta; the rounding
+  /// of the scalar bounds it below.
+  constexpr void set_tolerance(const S& tolerance) noexcept {
+    constexpr S least = scalar::Limits<S>::epsilon();
+    tolerance_ = select(tolerance > least, tolerance, least);
+    // −½ ln ε = ½ ln 2 · log₂ 1/ε.
+    int bits = 0;
+    for (S x = tolerance_; x < S(1) && bits < scalar::Limits<S>::digits; x = x + x) ++bits;
+    length_ = std::clamp(2 + (bits * 35 + 99) / 100, 4, order);
+    known_ = false;
+  }
+
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& /*system*/, StateOf<System>& state, const S& t,
+                         const S& h) noexcept {
+    failure_ = Failure::none;
+    if (!(known_ && state == delivered_ && is_near(t, time_, h))) start(state, t);
+    time_ = t + h;
+    offset_ = offset_ + h;
+    while (scalar::abs(offset_) > reach_) {
+      const S step = select(offset_ > S(0), reach_, -reach_);
+      if (!(reach_ > scalar::Limits<S>::epsilon() * scalar::abs(t))) {
+        const S size = step - step;
+        failure_ = size == S(0) ? Failure::step_too_short : Failure::not_finite;
+        for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+        known_ = false;
+        return;
+      }
+      advance(step);
+      offset_ = offset_ - step;
+    }
+    if (!(reach_ > S(0))) {
+      failure_ = Failure::not_finite;
+      for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+      known_ = false;
+      return;
+    }
+    const Coordinates change = increment(offset_);
+    Coordinates x = coefficients_[0];
+    for (std::size_t i = 0; i < n; ++i) x[i] = x[i] + (change[i] + low_[i]);
+    if constexpr (is_powered) work_ = work_before_ + x[Recurrence::work];
+    state = Recurrence::leave(x);
+    delivered_ = state;
+  }
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// ∫ dH/dt dt over the steps so far, J.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires is_powered
+  {
+    return work_;
+  }
+
+  /// Expansions so far.
+  [[nodiscard]] constexpr long long steps() const noexcept { return steps_; }
+
+  /// Why the last `do_step` could not reach its end.
+  [[nodiscard]] constexpr Failure failure() const noexcept { return failure_; }
+
+  /// The order in use.
+  [[nodiscard]] constexpr int length() const noexcept { return length_; }
+
+  /// How far the polynomial at hand is used in either direction of time, s.
+  [[nodiscard]] constexpr const S& reach() const noexcept { return reach_; }
+
+  /// Taylor coefficients of the coordinates about the start of the polynomial at hand, by order.
+  [[nodiscard]] constexpr const auto& coefficients() const noexcept { return coefficients_; }
+
+ private:
+  using Row = std::array<S, lanes>;
+
+  [[nodiscard]] static constexpr bool is_near(const S& a, const S& b, const S& h) noexcept {
+    const S size = select(scalar::abs(a) > scalar::abs(h), scalar::abs(a), scalar::abs(h));
+    return scalar::abs(a - b) <= S(8) * scalar::Limits<S>::epsilon() * size;
+  }
+
+  constexpr void start(const StateOf<System>& state, const S& t) noexcept {
+    known_ = true;
+    coefficients_[0] = Recurrence::enter(state, t);
+    low_ = {};
+    offset_ = S(0);
+    if constexpr (is_powered) work_before_ = work_;
+    expand();
+  }
+
+  /// Moves the centre of the expansion.
+  constexpr void advance(const S& step) noexcept {
+    const Coordinates change = increment(step);
+    Coordinates& x = coefficients_[0];
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto sum = scalar::two_sum(x[i], change[i] + low_[i]);
+      x[i] = sum.hi;
+      low_[i] = sum.lo;
+    }
+    S worst(0);
+    auto motors = Recurrence::leave(x).motors;
+    for (auto& motor : motors) {
+      const auto defect = unit_defect(motor);
+      worst = scalar::max_abs(worst, detail::size(defect));
+      motor = motor + unit_correction(motor, defect);
+    }
+    Recurrence::replace_motors(x, motors);
+    detail::record(drift_, worst);
+    expand();
+  }
+
+  /// x(offset) − x(0).
+  [[nodiscard]] constexpr Coordinates increment(const S& offset) const noexcept {
+    Coordinates sum = coefficients_[static_cast<std::size_t>(length_)];
+    for (std::size_t k = static_cast<std::size_t>(length_) - 1; k > 0; --k) {
+      for (std::size_t i = 0; i < n; ++i) sum[i] = mul_add(sum[i], offset, coefficients_[k][i]);
+    }
+    for (std::size_t i = 0; i < n; ++i) sum[i] = sum[i] * offset;
+    return sum;
+  }
+
+  constexpr void expand() noexcept {
+    ++steps_;
+    typename Recurrence::Known known{};
+    Coordinates change{};
+    Row sums{};
+    Recurrence::first(coefficients_[0], known, change);
+    coefficients_[1] = change;
+    for (std::size_t k = 1; k < static_cast<std::size_t>(length_); ++k) {
+      add_products(k, sums);
+      const S over = S(1) / S(static_cast<int>(k));
+      Recurrence::next(S(static_cast<int>(k)), over, coefficients_[k], known, sums.data(),
+                       u_[k].data(), v_[k].data(), change);
+      const S over_next = S(1) / S(static_cast<int>(k + 1));
+      for (std::size_t i = 0; i < n; ++i) coefficients_[k + 1][i] = over_next * change[i];
+    }
+    reach_ = reach_of_coefficients();
+  }
+
+  /// Σ u_j v_{k−j} over 0 < j < k, the newest coefficients last.
+  constexpr void add_products(std::size_t k, Row& sums) const noexcept {
+    for (std::size_t first = 0; first < lanes; first += block) {
+      std::array<S, block> sum{};
+      for (std::size_t j = k / 2; j > 0; --j) {
+        const S* u = u_[j].data() + first;
+        const S* v = v_[k - j].data() + first;
+        for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
+        if (k - j == j) continue;
+        u = u_[k - j].data() + first;
+        v = v_[j].data() + first;
+        for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
+      }
+      for (std::size_t l = 0; l < block; ++l) sums[first + l] = sum[l];
+    }
+  }
+
+  static constexpr int kinds = [] {
+    int most = 0;
+    for (const int part : Recurrence::parts) most = part + 1 > most ? part + 1 : most;
+    return most;
+  }();
+  using Sizes = std::array<S, static_cast<std::size_t>(kinds)>;
+
+  /// The largest coefficient of one order of each kind of coordinate.
+  [[nodiscard]] constexpr Sizes sizes(std::size_t k) const noexcept {
+    Sizes result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      if (Recurrence::parts[i] < 0) continue;
+      S& largest = result[static_cast<std::size_t>(Recurrence::parts[i])];
+      largest = scalar::max_abs(largest, coefficients_[k][i]);
+    }
+    return result;
+  }
+
+  /// x^(1/m) for x > 0.
+  [[nodiscard]] static constexpr S root(const S& x, std::size_t m) noexcept {
+    return scalar::exp(scalar::log(x) / S(static_cast<int>(m)));
+  }
+
+  /// The step whose last three terms stay below the tolerance times the size of the coordinates.
+  [[nodiscard]] constexpr S reach_of_coefficients() const noexcept {
+    const auto p = static_cast<std::size_t>(length_);
+    const std::array<Sizes, 3> first{sizes(0), sizes(1), sizes(2)};
+    const std::array<Sizes, 3> last{sizes(p - 2), sizes(p - 1), sizes(p)};
+    constexpr S unlimited = scalar::Limits<S>::max();
+    // A coordinate that passes through zero is as large as it becomes within a part of the
+    // series' radius.
+    S radius = unlimited;
+    for (std::size_t g = 0; g < static_cast<std::size_t>(kinds); ++g) {
+      for (std::size_t j = 0; j < 3; ++j) {
+        if (!(first[j][g] > S(0))) continue;
+        for (std::size_t m = 0; m < 3; ++m) {
+          if (!(last[m][g] > S(0))) continue;
+          const S r = root(first[j][g] / last[m][g], p - 2 + m - j);
+          radius = select(radius > r, r, radius);
+        }
+        break;
+      }
+    }
+    if (radius == unlimited) return unlimited;
+    const S span = radius / S(8);
+    S reach = unlimited;
+    for (std::size_t m = 0; m < 3; ++m) {
+      S ratio(0);
+      for (std::size_t g = 0; g < static_cast<std::size_t>(kinds); ++g) {
+        const S size = scalar::max_abs(first[0][g], first[1][g] * span, first[2][g] * span * span);
+        if (last[m][g] > S(0)) ratio = scalar::max_abs(ratio, last[m][g] / size);
+      }
+      if (!(ratio > S(0))) continue;
+      const S r = root(tolerance_ / ratio, p - 3 + m);
+      reach = select(reach > r, r, reach);
+    }
+    return reach;
+  }
+
+  std::array<Coordinates, static_cast<std::size_t>(order) + 1> coefficients_{};
+  std::array<Row, static_cast<std::size_t>(order) + 1> u_{};
+  std::array<Row, static_cast<std::size_t>(order) + 1> v_{};
+  Coordinates low_{};
+  StateOf<System> delivered_{};
+  S tolerance_ = scalar::Limits<S>::epsilon();
+  S reach_ = S(0);
+  S offset_ = S(0);
+  S time_ = S(0);
+  S work_{};
+  S work_before_{};
+  Drift<S> drift_;
+  long long steps_ = 0;
+  int length_ = order;
+  Failure failure_ = Failure::none;
+  bool known_ = false;
+};
+
+}  // namespace hamotor

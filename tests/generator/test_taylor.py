@@ -1,0 +1,359 @@
+"""Taylor series of the motion: coefficients, order and step control, dense output.
+
+References: series arithmetic of the system's own programs, which knows no recurrence; solutions of
+40 digits (tests/references).
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import mpmath
+import numpy as np
+import pytest
+
+import hamotor
+from hamotor.codegen.program import (
+    Call,
+    Expression,
+    Name,
+    Negative,
+    Number,
+    Product,
+    Program,
+    Quotient,
+    Sum,
+)
+from hamotor.codegen.taylor import Recurrence, recurrence, steps
+from hamotor.errors import UsageError
+from hamotor.mechanics.flow import WORK, motor_flow
+from hamotor.mechanics.proof import moved
+from hamotor.mechanics.states import (
+    coadjoint,
+    functions,
+    momentum_values,
+    motor_values,
+    random_states,
+)
+from hamotor.mechanics.straightline import FUNCTIONS
+from hamotor.mechanics.system import System
+from hamotor.run.library import SceneLibrary, Vector
+from hamotor.scene import Scene, bundled_scenes, read_scene, scene_source
+from hamotor.scene.motors import rotation_matrix
+from hamotor.scene.principal_system import principal_system
+
+REFERENCES = Path(__file__).resolve().parents[1] / "references"
+DIGITS = 50
+ORDER = 4
+AGREEMENT = mpmath.mpf(10) ** -44
+
+
+@dataclass(frozen=True)
+class Series:
+    """A truncated power series, multiplied and divided by the textbook."""
+
+    terms: tuple[Any, ...]
+
+    def __neg__(self) -> Series:
+        return Series(tuple(-x for x in self.terms))
+
+    def __add__(self, other: Any) -> Series:
+        if not isinstance(other, Series):
+            other = constant(other, len(self.terms))
+        return Series(tuple(x + y for x, y in zip(self.terms, other.terms, strict=True)))
+
+    def __sub__(self, other: Series) -> Series:
+        return self + -other
+
+    def __mul__(self, other: Any) -> Series:
+        if not isinstance(other, Series):
+            return Series(tuple(x * other for x in self.terms))
+        return Series(
+            tuple(
+                sum(self.terms[j] * other.terms[k - j] for j in range(k + 1))
+                for k in range(len(self.terms))
+            )
+        )
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Series:
+        if not isinstance(other, Series):
+            return Series(tuple(x / other for x in self.terms))
+        return self * lifted(lambda x: 1 / x)(other)
+
+    def __rtruediv__(self, other: Any) -> Series:
+        return constant(other, len(self.terms)) / self
+
+
+def constant(x: Any, length: int) -> Series:
+    return Series((x, *[mpmath.mpf(0)] * (length - 1)))
+
+
+def lifted(f: Callable[..., Any]) -> Callable[[Series], Series]:
+    """f of a series by its derivatives, f(a + d) = Σ f⁽ⁿ⁾(a)/n! dⁿ."""
+
+    def on_series(x: Series) -> Series:
+        length = len(x.terms)
+        rest = Series((mpmath.mpf(0), *x.terms[1:]))
+        total, power = constant(mpmath.mpf(0), length), constant(mpmath.mpf(1), length)
+        with mpmath.workdps(3 * DIGITS):
+            derivatives = mpmath.taylor(f, x.terms[0], length - 1)
+        for derivative in derivatives:
+            total, power = total + power * derivative, power * rest
+        return total
+
+    return on_series
+
+
+def angle(y: Series, x: Series) -> Series:
+    """atan2, from the logarithm of a complex series."""
+    turned = lifted(mpmath.log)(x + y * mpmath.mpc(0, 1))
+    return Series(tuple(mpmath.im(term) for term in turned.terms))
+
+
+def series_functions() -> dict[str, Callable[..., Any]]:
+    named = {n: lifted(getattr(mpmath, n)) for n in FUNCTIONS.values() if hasattr(mpmath, n)}
+    exact = functions(random.Random(1))["number"]
+    return named | {"sqrt": lifted(mpmath.sqrt), "atan2": angle, "number": exact}
+
+
+def expected_coefficients(system: System) -> tuple[dict[str, Any], dict[str, list[Any]]]:
+    """A random state, and the motion's Taylor coefficients there by iterating ẋ = f(x)."""
+    state = next(random_states(system))
+    bodies = system.hamiltonian.bodies
+    known = {name: [x] for name, x in state.values.items()} | {WORK: [mpmath.mpf(0)]}
+    functions_ = series_functions()
+    for length in range(1, ORDER + 1):
+        values = {n: Series((*c, *[mpmath.mpf(0)] * (length - len(c)))) for n, c in known.items()}
+        found = system.gradient.evaluate(values, functions_)
+        change: dict[str, Any] = {"t": constant(mpmath.mpf(1), length)}
+        change[WORK] = system.power.evaluate(values, functions_)["value"]
+        for k, body in enumerate(bodies):
+            generators = body.group.generators
+            rate = [as_series(found[f"rate{k}.{g.rate}"], length) for g in generators]
+            forque = [as_series(found[f"forque{k}.{g.momentum}"], length) for g in generators]
+            momentum = [values[f"mu{k}.{g.momentum}"] for g in generators]
+            turning = coadjoint(body, rate, momentum)
+            change |= momentum_values(
+                body, k, [c + -f for c, f in zip(turning, forque, strict=True)]
+            )
+            motor: dict[int, Any] = {}
+            for c in body.group.element.components:
+                for blade, x in c.embedding.items():
+                    term = values[f"m{k}.{c.name}"] * (mpmath.mpf(x.numerator) / x.denominator)
+                    motor[blade] = motor.get(blade, 0) + term
+            at = replace(
+                state, motors=tuple(motor if i == k else m for i, m in enumerate(state.motors))
+            )
+            change |= motor_values(body, k, moved(body, at, k, rate))
+        for name, derivative in change.items():
+            known[name].append(as_series(derivative, length).terms[length - 1] / length)
+    return {name: c[0] for name, c in known.items()}, known
+
+
+def as_series(x: Any, length: int) -> Series:
+    return x if isinstance(x, Series) else constant(mpmath.mpf(x), length)
+
+
+def plain_functions() -> dict[str, Callable[..., Any]]:
+    return functions(random.Random(1))
+
+
+def expect_equal(
+    found: Mapping[str, list[Any]], expected: Mapping[str, list[Any]], what: str
+) -> None:
+    for name, series in found.items():
+        for k, x in enumerate(series):
+            size = max(abs(other[k]) for other in expected.values() if len(other) > k)
+            assert abs(x - expected[name][k]) <= AGREEMENT * size, f"{what}: {name}, order {k}"
+
+
+def of_emitted_programs(r: Recurrence, start: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """What the programs that become C++ compute."""
+    programs, given = steps(r), plain_functions()
+    zero = given["number"](Fraction(0))
+    names = [name for name, _ in r.derivatives]
+    found = {name: [start[name]] for name in names}
+    x = {f"x[{i}]": start[name] for i, name in enumerate(names)}
+    known = programs.first.evaluate(x, given)
+    change = known
+    rows: list[Mapping[str, Any]] = [{}]
+    for k in range(1, ORDER + 1):
+        for i, name in enumerate(names):
+            x[f"x[{i}]"] = change[f"change[{i}]"] / k
+            found[name].append(x[f"x[{i}]"])
+        sums = {
+            f"sums[{n}]": sum(
+                (rows[j][f"u[{n}]"] * rows[k - j][f"v[{n}]"] for j in range(1, k)), zero
+            )
+            for n in range(len(r.lanes))
+        }
+        order = {"k": mpmath.mpf(k), "over_k": 1 / mpmath.mpf(k)}
+        change = programs.next.evaluate({**x, **known, **sums, **order}, given)
+        rows.append(change)
+    return found
+
+
+@pytest.mark.parametrize("name", [name for name, _ in bundled_scenes()])
+def test_coefficients_are_those_of_series_arithmetic(name: str) -> None:
+    scene = read_scene(name)
+    system = principal_system(scene) if isinstance(scene, Scene) else scene.system
+    with mpmath.workdps(DIGITS):
+        start, expected = expected_coefficients(system)
+        series = recurrence(motor_flow(system).field)
+        found = series.coefficients(start, ORDER, plain_functions())
+        expect_equal(found, expected, name)
+        expect_equal(of_emitted_programs(series, start), found, f"{name}, as programs")
+
+
+def test_every_function_has_its_series() -> None:
+    x, y = Name("x"), Name("y")
+    calls = ["exp", "sin", "cos", "tan", "sinh", "cosh", "tanh", "asin", "acos", "atan"]
+    terms: list[Expression] = [Call(f, (Product(Number(Fraction(1, 3)), x),)) for f in calls]
+    square = Sum(Product(x, x), Product(y, y))
+    terms += [Call("log", (square,)), Call("atan2", (y, x)), Quotient(x, Sum(y, Number(2)))]
+    terms += [Call("sqrt", (Product(Number(2), square),))]
+    terms += [Quotient(y, Product(square, Call("sqrt", (Product(Number(3), square),))))]
+    derivative: Expression = terms[0]
+    for term in terms[1:]:
+        derivative = Sum(derivative, term)
+    field = Program((), (), (("x", derivative), ("y", Product(x, Negative(y)))), None)
+    with mpmath.workdps(DIGITS):
+        start = {"x": mpmath.mpf("0.3"), "y": mpmath.mpf("-0.7")}
+        expected = {name: [value] for name, value in start.items()}
+        for length in range(1, ORDER + 1):
+            values = {name: Series(tuple(c)) for name, c in expected.items()}
+            for name, series in field.evaluate(values, series_functions()).items():
+                expected[name].append(series.terms[-1] / length)
+        r = recurrence(field)
+        expect_equal(r.coefficients(start, ORDER, plain_functions()), expected, "functions")
+        expect_equal(of_emitted_programs(r, start), expected, "functions, as programs")
+
+
+def test_what_is_not_analytic_is_refused_by_name(tmp_path: Path) -> None:
+    text = """algebra = "pga3"
+[[body]]
+name = "b"
+mass = 1.0
+inertia = [1.0, 2.0, 3.0]
+[[interaction]]
+type = "potential"
+expression = "abs(at(b, 0, 0, 1).z)"
+[time]
+end = 1.0
+step = 0.01
+"""
+    path = tmp_path / "floor.toml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=r'method "taylor" needs .* abs'):
+        scene_source(read_scene(path), method="taylor")
+
+
+# ---------------------------------------------------------------- whole runs
+
+
+def library_of(folder: Path, problem: str) -> tuple[SceneLibrary, Vector, dict[str, Any]]:
+    """A problem of tests/references with the method compiled, its start and its solution."""
+    reference = json.loads((REFERENCES / f"{problem}.json").read_text())
+    given = reference["params"]
+    top, forced = problem == "P3", problem in {"P3", "P4"}
+    lever = given["m"] * given["l"] ** 2 if top else 0.0
+    moments = given["J"]
+    lines = [
+        'algebra = "pga3"',
+        'group = "SO3"' if top else "",
+        "[[body]]",
+        'name = "b"',
+        f"mass = {float(given['m'])}",
+        f"inertia = {[moments[0] - lever, moments[1] - lever, moments[2]]}",
+        f"center_of_mass = [0, 0, {given['l']}]" if top else f"position = {given['x0']}",
+        f"orientation = {{ quaternion = {given['q0']} }}",
+        f"angular_velocity = {given['w0']}",
+        "" if top else f"velocity = {given['v0']}",
+        *(["[[interaction]]", 'type = "gravity"', "acceleration = [0, 0, -9.81]"] * forced),
+    ]
+    if problem == "P4":
+        lines += ["[[interaction]]", 'type = "spring"', 'body = "b"', f"at = {given['a']}"]
+        lines += ["anchor = [0, 0, 0]", f"stiffness = {given['k']}"]
+    lines += ["[time]", f"end = {given['T']}", "step = 0.01", 'method = "taylor"']
+    path = folder / f"{problem}.toml"
+    path.write_text("\n".join(lines))
+    simulation = hamotor.load(path)
+    compiled = simulation.compile(method="taylor")
+    assert compiled.description.methods == simulation.methods, "the runtime and the list agree"
+    assert "taylor" in compiled.description.error_controlled
+    return compiled.library, simulation.state, reference
+
+
+@pytest.fixture(scope="module")
+def problems(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Any]:
+    folder = tmp_path_factory.mktemp("problems")
+    return functools.cache(lambda problem: library_of(folder, problem))
+
+
+def rotation_error(state: Vector, checkpoint: Mapping[str, Any]) -> float:
+    w, x, y, z = (float(c) for c in checkpoint["q"])
+    found, expected = rotation_matrix(state[:4].tolist()), rotation_matrix((w, -x, -y, -z))
+    return float(np.abs(found - expected).max())
+
+
+@pytest.mark.parametrize(
+    ("problem", "tolerance", "bound"),
+    [
+        ("P1", 1e-6, 3e-4), ("P1", 1e-9, 3e-7), ("P1", 1e-12, 1e-9),
+        ("P3", 1e-6, 1e-5), ("P3", 1e-9, 1e-8), ("P3", 1e-12, 3e-11),
+        ("P4", 1e-6, 1e-3), ("P4", 1e-9, 1e-6), ("P4", 1e-12, 1e-9),
+    ],
+)  # fmt: skip
+def test_errors_follow_the_tolerance(
+    problems: Callable[[str], Any], problem: str, tolerance: float, bound: float
+) -> None:
+    library, start, reference = problems(problem)
+    end = float(reference["params"]["T"])
+    with library.start("taylor", step=end, state=start, tolerance=tolerance) as run:
+        assert run.advance(1, 0, None) == 1
+        assert rotation_error(run.state(), reference["checkpoints"][-1]) < bound
+
+
+def test_dense_output_costs_no_steps_and_no_digits(problems: Callable[[str], Any]) -> None:
+    library, start, reference = problems("P4")
+    with library.start("taylor", step=5.0, state=start, tolerance=1e-13) as run:
+        for checkpoint in reference["checkpoints"]:
+            run.advance(1, 0, None)
+            assert rotation_error(run.state(), checkpoint) < 1e-10
+        coarse, at_the_end = run.steps(), run.state()
+    with library.start("taylor", step=0.01, state=start, tolerance=1e-13) as run:
+        assert run.advance(5000, 0, None) == 5000
+        assert run.steps() == coarse < 1000
+        assert np.abs(run.state() - at_the_end).max() < 1e-12
+
+
+def test_time_runs_backwards(problems: Callable[[str], Any]) -> None:
+    library, start, _ = problems("P4")
+    with library.start("taylor", step=5.0, state=start) as run:
+        run.advance(1, 0, None)
+        there = run.state()
+    with library.start("taylor", step=-5.0, state=there) as run:
+        run.advance(1, 0, None)
+        assert np.abs(run.state() - start).max() < 1e-12
+
+
+def test_tighter_tolerances_take_higher_orders_not_many_more_steps(
+    problems: Callable[[str], Any],
+) -> None:
+    library, start, _ = problems("P3")
+    taken = []
+    for tolerance in (1e-6, 1e-14):
+        with library.start("taylor", step=20.0, state=start, tolerance=tolerance) as run:
+            run.advance(1, 0, None)
+            taken.append(run.steps())
+    assert 0.3 < taken[1] / taken[0] < 3
