@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +16,7 @@ from tests.bench.precision import peers
 from hamotor.bench import endpoint
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import Extent, measure
-from hamotor.bench.precision_report import best, table
+from hamotor.bench.precision_report import best, table, write_report
 from hamotor.bench.problems import REFERENCES, Problem, own_problems, problem
 
 
@@ -84,7 +85,7 @@ def test_a_setting_counts_only_if_the_next_two_finer_ones_meet_the_target() -> N
 
 
 @pytest.mark.slow
-def test_a_methods_settings_are_timed_from_coarse_to_fine() -> None:
+def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path: Path) -> None:
     one = problem("planar")
     simulation = replace(one.simulation, methods={"splitting8": 8, "splitting10": 10})
     extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++", "clang++")[:1])
@@ -98,6 +99,13 @@ def test_a_methods_settings_are_timed_from_coarse_to_fine() -> None:
         assert min(errors) < 1e-3 * max(errors)
         assert all(0 < row["best_us"] <= row["median_us"] <= row["worst_us"] for row in rows)
     assert "planar" in table(account)
+    json_file, page_file, *_ = write_report(account, tmp_path)
+    page = page_file.read_text(encoding="utf-8")
+    assert not re.findall(r"(?:src|href)=|https?://(?!www\.w3\.org/2000/svg)", page)
+    embedded = re.search(r'type="application/json">(.*?)</script>', page, re.DOTALL)
+    assert embedded is not None
+    assert json.loads(embedded[1]) == json.loads(json_file.read_text(encoding="utf-8"))
+    assert (tmp_path / "precision_planar.svg").is_file()
 
 
 def test_the_problems_are_named_as_their_references() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,50 +78,167 @@ def best(
     return min(candidates, key=lambda found: found.microseconds, default=None)
 
 
-def table(account: Mapping[str, Any]) -> str:
+def standings(account: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Problem by target: the best of ours, the best public solver, their ratio and the goal."""
     rows: Rows = account["rows"]
-    lines = ["time of a whole integration, best of the runs; error: attitude at the end"]
+    found = []
     for name, said in account["problems"].items():
-        lines += ["", f"{name}: {said['description']}, {said['end_s']:g} s"]
-        lines.append(
-            f"  {'error':>6}  {'ours, µs':>9}  {'by':<34}{'peer, µs':>10}  {'by':<34}"
-            f"{'x':>6}{'goal':>7}"
-        )
         for index, target in enumerate(account["targets"]):
             our, their = (best(rows, name, target, ours=ours) for ours in (True, False))
             goal = said["goals"][index] if index < len(said["goals"]) else None
             ratio = their.microseconds / our.microseconds if our and their else None
-            verdict = ""
-            if goal is not None:
-                verdict = "" if ratio is not None and ratio >= goal else "  missed"
-            lines.append(
-                f"  {target:>6.0e}  {_time(our):>9}  {our.name if our else '-':<34}"
-                f"{_time(their):>10}  {their.name if their else '-':<34}"
-                f"{'-' if ratio is None else f'{ratio:.2g}':>6}"
-                f"{'-' if goal is None else f'{goal:g}':>7}{verdict}"
+            # Where no public solver arrives, to arrive is all there is to do.
+            met = our is not None if their is None else ratio is not None and ratio >= (goal or 1)
+            found.append(
+                {
+                    "problem": name,
+                    "target": target,
+                    "ours": _said(our),
+                    "peer": _said(their),
+                    "ratio": ratio,
+                    "goal": goal,
+                    "verdict": "met" if met else "missed",
+                }
             )
-        failures = [r for r in rows if r["problem"] == name and r["failure"] is not None]
+    return found
+
+
+def _said(found: Best | None) -> dict[str, Any] | None:
+    return None if found is None else {"name": found.name, "us": found.microseconds}
+
+
+def table(account: Mapping[str, Any]) -> str:
+    """What a person reads: the standings and all that belongs to them."""
+    lines = ["time of a whole integration, best of the runs; error: attitude at the end"]
+    for name, said in account["problems"].items():
+        lines += ["", f"{name}: {said['description']}, {said['end_s']:g} s"]
+        lines.append(
+            f"  {'error':>6}  {'ours, µs':>9}  {'by':<28}{'peer, µs':>10}  {'by':<28}"
+            f"{'x':>6}{'goal':>7}"
+        )
+        for standing in account["best"]:
+            if standing["problem"] != name:
+                continue
+            ratio, goal = standing["ratio"], standing["goal"]
+            lines.append(
+                f"  {standing['target']:>6.0e}  {_cells(standing['ours'], 9)}"
+                f"{_cells(standing['peer'], 10)}"
+                f"{'-' if ratio is None else f'{ratio:.2g}':>6}"
+                f"{'-' if goal is None else f'{goal:g}':>7}"
+                + ("  missed" if standing["verdict"] == "missed" else "")
+            )
+        failures = sum(r["problem"] == name and r["failure"] is not None for r in account["rows"])
         if failures:
-            lines.append(f"  {len(failures)} settings failed; they are rows of the account")
+            lines.append(f"  {failures} settings failed; they are rows of the account")
     lines += ["", *(f"not compared: {who}: {why}" for who, why in account["not_there"].items())]
-    from_where = account["provenance"]
-    peers = ", ".join(f"{who} {version}" for who, version in from_where["peers"].items())
-    lines.append(
-        f"{from_where['processor']}; {'; '.join(from_where['compilers'].values())}; {peers}"
-    )
+    said = account["provenance"]
+    peers = ", ".join(f"{who} {version}" for who, version in said["peers"].items())
+    lines.append(f"{said['processor']}; {'; '.join(said['compilers'].values())}; {peers}")
     return "\n".join(lines)
 
 
-def _time(found: Best | None) -> str:
-    return "-" if found is None else f"{found.microseconds:.4g}"
+def _cells(found: Mapping[str, Any] | None, width: int) -> str:
+    if found is None:
+        return f"{'-':>{width}}  {'-':<28}"
+    return f"{found['us']:>{width}.4g}  {found['name']:<28}"
 
 
 def write_report(account: Mapping[str, Any], out: Path) -> list[Path]:
-    """Write precision.json, diagrams and precision.html; returns the files."""
-    import json
+    """Write precision.json, a diagram of each problem as PNG and SVG, and precision.html.
 
+    Returns the files.  The page holds the whole account and needs no network.
+    """
     out.mkdir(parents=True, exist_ok=True)
-    file = out / "precision.json"
-    file.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-    return [file]
+    whole = json.dumps(account)
+    files = [out / "precision.json", out / "precision.html"]
+    files[0].write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+    # What a script element holds ends at its first end tag, in a string or not.
+    page = _PAGE.read_text(encoding="utf-8").replace("@ACCOUNT@", whole.replace("</", "<\\/"))
+    files[1].write_text(page, encoding="utf-8")
+    for name in account["problems"]:
+        files += _draw(account, name, out / f"precision_{name}")
+    return files
+
+
+_PAGE: Final = Path(__file__).resolve().parents[3] / "templates" / "precision.html"
+_SHOWN: Final = 7
+_COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7f3c8d")
+_PEERS: Final = {
+    "heyoka": "#000000", "odeint": "#8a5a00", "Eigen": "#777777", "SciPy": "#999999",
+    "MuJoCo": "#bbbbbb",
+}  # fmt: skip
+
+
+def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
+    """Error over time: the methods that are ahead somewhere, and every public solver."""
+    from matplotlib.figure import Figure
+
+    ladders = {
+        name: ladder
+        for (of, name), ladder in by_contestant(account["rows"]).items()
+        if of == problem
+    }
+    chosen = _ahead(ladders)
+    figure = Figure(figsize=(8.6, 5.6), layout="constrained")
+    ax = figure.subplots()
+    colours = iter(_COLOURS)
+    for name in chosen:
+        ladder = [
+            row
+            for row in ladders[name]
+            if row["failure"] is None and 0 < row["errors"].get(ATTITUDE, -1) < 1
+        ]
+        family = ladders[name][0]["family"]
+        ours = family == "hamotor"
+        ax.plot(
+            [row["best_us"] for row in ladder],
+            [row["errors"][ATTITUDE] for row in ladder],
+            marker="o" if ours else "s", markersize=3, linewidth=1.6 if ours else 1.1,
+            linestyle="-" if ours else "--", label=name,
+            color=next(colours) if ours else _PEERS[family],
+        )  # fmt: skip
+    for target in account["targets"]:
+        ax.axhline(target, color="#eeeeee", linewidth=0.8, zorder=0)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_xlabel("time of the whole integration, µs (best of the runs)")
+    ax.set_ylabel("error of the attitude at the end, rad")
+    ax.set_title(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
+    figure.legend(loc="outside right upper", fontsize=8, frameon=False)
+    files = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
+    for file in files:
+        unfinished = file.with_name(f".{os.getpid()}-{file.name}")
+        figure.savefig(unfinished, dpi=150, format=file.suffix[1:])
+        unfinished.replace(file)
+    return files
+
+
+def _ahead(ladders: Mapping[str, Rows]) -> list[str]:
+    """Ours by how many decades of error they reach first, and one of each public solver."""
+    decades = [10.0**-k for k in range(3, 13)]
+    score: dict[str, float] = {}
+    fastest: dict[tuple[str, float], float] = {}
+    for name, ladder in ladders.items():
+        for target in decades:
+            times = [row["best_us"] for row in meeting(ladder, target)]
+            if times:
+                fastest[name, target] = min(times)
+
+    def is_ours(name: str) -> bool:
+        return bool(ladders[name][0]["family"] == "hamotor")
+
+    for target in decades:
+        for side in (True, False):
+            times_here = {
+                name: fastest[name, target]
+                for name in ladders
+                if (name, target) in fastest and is_ours(name) == side
+            }
+            for name, needed in times_here.items():
+                score[name] = score.get(name, 0.0) + min(times_here.values()) / needed
+    ranked = sorted(score, key=lambda name: -score[name])
+    peers: dict[str, str] = {}
+    for name in ranked:
+        if not is_ours(name):
+            peers.setdefault(ladders[name][0]["contestant"], name)
+    return [*[name for name in ranked if is_ours(name)][:_SHOWN], *peers.values()]

@@ -160,24 +160,28 @@ class Heyoka:
         )
         self.set_up_s = time.perf_counter() - began
         self._problem = problem
+        self._integrator.propagate_until(problem.end)
+        self._empty = min(self._call() for _ in range(50))
+
+    def _call(self) -> float:
+        """Seconds of a call from Python that has nothing to do."""
+        began = time.perf_counter()
+        self._integrator.propagate_until(self._problem.end)
+        return time.perf_counter() - began
 
     def run(self, repetitions: int) -> Result:
         """The same; the time of a call that has nothing to do is taken off."""
         integrator, end = self._integrator, self._problem.end
-        seconds, idle = [], []
+        seconds = []
         for _ in range(repetitions):
             integrator.time = 0.0
             integrator.state[:] = self._problem.state
             began = time.perf_counter()
             answer = integrator.propagate_until(end)
-            ended = time.perf_counter()
-            state = [float(x) for x in integrator.state]
-            integrator.propagate_until(end)
-            idle.append(time.perf_counter() - ended)
-            seconds.append(ended - began)
+            seconds.append(time.perf_counter() - began - self._empty)
         steps = int(answer[3])
-        empty = min(idle)
-        return Result([s - empty for s in seconds], state, steps, steps * integrator.order)
+        state = [float(x) for x in integrator.state]
+        return Result(seconds, state, steps, steps * integrator.order)
 
 
 class SciPy:
