@@ -209,7 +209,12 @@ def _add_run(parser: _Parser) -> None:
     )
     parser.add_argument("--end", metavar="T", type=_positive, help="end time, s")
     parser.add_argument("--every", metavar="N", type=_count, help="record every N-th step")
-    parser.add_argument("--scalar", metavar="S", default="double", help="double|float|long_double")
+    parser.add_argument(
+        "--scalar", metavar="S", default="double", help="double|float|long_double|quad|mpfr"
+    )
+    parser.add_argument(
+        "--digits", metavar="N", type=_count, help="of --scalar mpfr, at most 60 (default: 50)"
+    )
     parser.add_argument(
         "--kernels",
         metavar="K",
@@ -345,6 +350,7 @@ def _run(parsed: argparse.Namespace) -> int:
             method=parsed.method,
             every=parsed.every,
             scalar=parsed.scalar,
+            digits=parsed.digits,
             kernels=parsed.kernels,
             representation=parsed.representation,
             out=out,

@@ -41,7 +41,7 @@ def agree_in(simulation: hamotor.Simulation, scalar: str, *methods: str) -> None
             step = (simulation.step or 1e-3) / 4
             with library.start(method, step=step, state=simulation.state) as run:
                 assert run.advance(STEPS, 0, None) == STEPS
-                found.append(run.observe_wide())
+                found.append(np.array(run.observe_text(), np.longdouble))
         agree(libraries, found, rounding)
 
 

@@ -19,6 +19,7 @@ from hamotor.mechanics.system import System
 from hamotor.scene import parse_scene
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.general_source import general_source
+from hamotor.scene.source import DOUBLE
 
 OPEN = {"damped and driven", "not quadratic"}
 """Those that time or something applied does work on."""
@@ -191,8 +192,8 @@ def test_a_scene_whose_programs_are_wrong_is_not_compiled() -> None:
     )
     scene = parse_scene(text, name="test", file="test.toml")
     assert isinstance(scene, GeneralScene)
-    assert "rate" in general_source(scene, "generated", "double")
+    assert "rate" in general_source(scene, "generated", DOUBLE)
     h = scene.hamiltonian
     wrong = dataclasses.replace(scene, hamiltonian=Fast(h.bodies, h.energy, h.parameters))
     with pytest.raises(ValueError, match="rate of a, component 0"):
-        general_source(wrong, "generated", "double")
+        general_source(wrong, "generated", DOUBLE)

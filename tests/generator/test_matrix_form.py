@@ -81,7 +81,7 @@ def after(
 ) -> NDArray[np.longdouble]:
     with library.start(method, step=step, state=simulation.state) as run:
         assert run.advance(steps, 0, None) == steps
-        return run.observe_wide()
+        return np.array(run.observe_text(), np.longdouble)
 
 
 def sizes(library: SceneLibrary, row: NDArray[np.longdouble]) -> NDArray[np.longdouble]:

@@ -44,7 +44,7 @@ class TestText:
     def test_literals_have_the_precision_of_the_scalar(self) -> None:
         assert "{0.02, 0.05, 0.06}" in re.sub(r"\s+", " ", self.flat("double"))
         assert "{0.02F, 0.05F, 0.06F}" in self.flat("float")
-        assert "{0.02L, 0.05L, 0.06L}" in self.flat("long_double")
+        assert "{(S(1) / S(50)), (S(1) / S(20)), (S(3) / S(50))}" in self.flat("quad")
 
     def flat(self, scalar: str) -> str:
         text = re.sub(r"\s+", " ", scene_source(read_scene("two_bodies"), scalar=scalar))

@@ -83,7 +83,7 @@ void write_row(const Run& run, double* row) {
 
 EXPORT const char* hamotor_describe() {
   return R"({"abi": )" ABI R"(, "scene": "toy", "algebra": "pga3", "group": "SE3",
- "scalar": "double", "kernels": "generated", "compiler": "toy", "fma": false, "bodies": ["bob"],
+ "scalar": "double", "digits": 17, "kernels": "generated", "compiler": "toy", "fma": false, "bodies": ["bob"],
  "methods": [{"name": "splitting2", "order": 2, "error_controlled": false}, {"name": "euler", "order": 1, "error_controlled": false}],
  "motor": ["s","e23","e31","e12","e01","e02","e03","e0123"],
  "momentum": ["e23","e31","e12","e01","e02","e03"],
@@ -144,11 +144,9 @@ EXPORT void hamotor_observe(const void* handle, double* row) {
   write_row(*static_cast<const Run*>(handle), row);
 }
 
-EXPORT void hamotor_observe_wide(const void* handle, long double* row) {
-  double values[columns];
-  write_row(*static_cast<const Run*>(handle), values);
-  for (int k = 0; k < columns; ++k) row[k] = values[k];
-}
+EXPORT void* hamotor_start_text(const char*, double, const char*) { return nullptr; }
+
+EXPORT std::int64_t hamotor_observe_text(const void*, char*, std::int64_t) { return 0; }
 
 EXPORT void hamotor_state(const void* handle, double* state) {
   double row[columns];

@@ -25,6 +25,10 @@
 // and then HAMOTOR_SCENE(Struct).  The linked program below it is only this file's test.
 #include <gtest/gtest.h>
 
+#include <cstdlib>
+#include <sstream>
+#include <string>
+
 #include "hamotor/pga3/se3.hpp"
 #include "hamotor/scene_abi.hpp"
 
@@ -106,9 +110,18 @@ TEST(ExampleScene, rows_come_every_so_many_steps_and_their_invariants_hold) {
     ASSERT_NE(run, nullptr);
     Row first{};
     hamotor_observe(run, first.data());
-    std::array<long double, std::tuple_size_v<Row>> wide{};
-    hamotor_observe_wide(run, wide.data());
-    for (std::size_t k = 0; k < wide.size(); ++k) EXPECT_EQ(first[k], wide[k]);
+    std::string text(30 * first.size(), ' ');
+    const auto size =
+        hamotor_observe_text(run, text.data(), static_cast<std::int64_t>(text.size()));
+    EXPECT_LT(size, static_cast<std::int64_t>(text.size()));
+    std::istringstream words(text);
+    for (const double x : first) {
+      std::string word;
+      words >> word;
+      EXPECT_EQ(std::strtod(word.c_str(), nullptr), x);
+    }
+    EXPECT_EQ(hamotor_observe_text(run, text.data(), 4), size);
+    EXPECT_EQ(std::string(text.c_str()).size(), 3U);
     std::array<Row, 4> rows{};
     EXPECT_EQ(hamotor_advance(run, 7, 5, rows[0].data()), 7);
     EXPECT_EQ(hamotor_advance(run, 10, 5, rows[1].data()), 10);

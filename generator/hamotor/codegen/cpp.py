@@ -53,10 +53,11 @@ WHOLE = 2**53
 
 
 def number_text(value: Rational) -> str:
-    """An exact constant of scalar type S; with 40 digits, where its integers are too long."""
+    """An exact constant of scalar type S; with 62 digits, where its integers are too long."""
     if max(abs(value.numerator), value.denominator) > WHOLE:
-        digits = Context(prec=40)
-        return f"S({digits.divide(Decimal(value.numerator), Decimal(value.denominator)):E}L)"
+        numerator, denominator = Decimal(value.numerator), Decimal(value.denominator)
+        short, long = (f"{Context(prec=n).divide(numerator, denominator):E}" for n in (40, 62))
+        return f'scalar::number<S>({short}L, [] {{ return "{long}"; }})'
     if value.denominator == 1:
         return f"S({value.numerator})"
     if value.denominator & (value.denominator - 1) == 0 and value.denominator <= 1024:

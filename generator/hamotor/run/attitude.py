@@ -8,12 +8,10 @@ e12 = −sin φ/2. What translates or scales adds blades with e0 or e∞, and a 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-
-Float = TypeVar("Float", np.float64, np.longdouble)
 
 AXES = "xyzw"
 """Of positions, in order."""
@@ -30,12 +28,13 @@ def has_attitude(algebra: str, blades: Iterable[str]) -> bool:
 
 
 def rotation_matrices(
-    blades: Mapping[str, NDArray[Float]],
-) -> NDArray[Float]:
+    blades: Mapping[str, NDArray[Any]],
+) -> NDArray[Any]:
     """R with v_world = R v_body, shape (n, d, d), d the highest index among the blades.
 
     `blades`: blade → components of the motors, shape (n,) each.  The size of the rotor part does
     not matter: only its direction is used.  R_jk is the part along e_j of M e_k M~ / M M~.
+    Numbers are doubles, or objects such as fractions.
     """
     dimension = max(int(index) for blade in blades for index in blade[1:] if index.isdecimal())
     rotor = [(blade[1:], x) for blade, x in blades.items() if not set(blade) & {"0", "i"}]

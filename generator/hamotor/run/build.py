@@ -15,8 +15,9 @@ import platform
 import shlex
 import shutil
 import subprocess
+import tempfile
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -109,12 +110,78 @@ def flags_for(machine: str) -> tuple[str, ...]:
     )
 
 
-def find_compiler(cache: Path) -> Compiler:
-    """The compiler in $CXX, or else g++, or else clang++.
+@dataclass(frozen=True)
+class Requirement:
+    """A library that a scalar is made of: what to link, a text that shows it is there, advice."""
+
+    links: tuple[str, ...]
+    probe: str
+    missing: str
+
+
+def requirement_of(scalar: str, machine: str) -> Requirement | None:
+    """What scenes of a scalar (`quad`, `mpfr50`) need besides a compiler."""
+    if scalar.startswith("mpfr"):
+        return Requirement(
+            ("-lmpfr", "-lgmp"),
+            "#include <mpfr.h>\nint probe(mpfr_ptr x) { return mpfr_sin(x, x, MPFR_RNDN); }\n",
+            "MPFR not found, which --scalar mpfr needs. "
+            "Install it, for example: sudo apt-get install libmpfr-dev",
+        )
+    if scalar == "quad" and machine in {"x86_64", "AMD64", "i686", "i386", "ppc64le"}:
+        return Requirement(
+            ("-lquadmath",),
+            'extern "C" __float128 sinq(__float128);\n'
+            "__float128 probe(__float128 x) { return sinq(x) / x; }\n",
+            "--scalar quad needs a compiler with __float128 and its library libquadmath, "
+            "as g++ has: sudo apt-get install g++, or take --scalar mpfr",
+        )
+    return None  # elsewhere long double has 113 bits
+
+
+def find_compiler(cache: Path, requirement: Requirement | None = None) -> Compiler:
+    """The compiler in $CXX, or else g++, or else clang++: the first that has what is required.
 
     Raises ToolError when there is none.  Its version is remembered by path, size and time of
     change, so that a second call starts no process.
     """
+    tried = []
+    for compiler in _compilers(cache):
+        if requirement is None or _has(compiler, requirement, cache):
+            return compiler
+        tried.append(shlex.join(compiler.command))
+    assert requirement is not None
+    raise ToolError(f"{requirement.missing}. (Tried with {' and '.join(tried)}.)")
+
+
+def _has(compiler: Compiler, requirement: Requirement, cache: Path) -> bool:
+    """Whether what is required compiles and links; a success is remembered."""
+    known = json.dumps([compiler.command, compiler.version, requirement.links])
+    remembered = cache / "compilers.json"
+    answers = _read_json_object(remembered)
+    if known in answers:
+        return True
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / "probe.cpp"
+        source.write_text(requirement.probe)
+        flags = ("-shared", "-fPIC", "-o", str(source.with_suffix(".so")), str(source))
+        try:
+            subprocess.run(
+                [*compiler.command, *flags, *requirement.links],
+                capture_output=True,
+                check=True,
+                timeout=60,
+            )
+        except (OSError, subprocess.SubprocessError):
+            return False
+    answers[known] = "yes"
+    cache.mkdir(parents=True, exist_ok=True)
+    _write_whole(remembered, json.dumps(answers, indent=1).encode())
+    return True
+
+
+def _compilers(cache: Path) -> Iterator[Compiler]:
+    """The one in $CXX, or those there are."""
     wanted = os.environ.get("CXX", "").strip()
     if wanted:
         command = tuple(shlex.split(wanted))
@@ -123,10 +190,12 @@ def find_compiler(cache: Path) -> Compiler:
                 f'the compiler in $CXX, "{command[0]}", is not on the PATH. '
                 "Correct CXX or unset it to use g++ or clang++."
             )
-        return Compiler(command, _version_of(command, cache))
-    for name in ("g++", "clang++"):
-        if shutil.which(name):
-            return Compiler((name,), _version_of((name,), cache))
+        yield Compiler(command, _version_of(command, cache))
+        return
+    names = [name for name in ("g++", "clang++") if shutil.which(name)]
+    yield from (Compiler((name,), _version_of((name,), cache)) for name in names)
+    if names:
+        return
     raise ToolError(
         "no C++ compiler found: neither $CXX nor g++ nor clang++. "
         "Install one, for example: sudo apt-get install g++"
@@ -226,12 +295,14 @@ def compile_scene(
     *,
     includes: Sequence[Path] | None = None,
     libraries: Sequence[Path] = (),
+    scalar: str = "double",
     cache: Path | None = None,
     on_compile: Callable[[], None] = lambda: None,
 ) -> CompiledScene:
     """Compile the C++ text of a scene to a shared library, or find it compiled already.
 
     `libraries` are folders of headers that others maintain: a version is what distinguishes them.
+    `scalar` is what the scene calculates with.
 
     `on_compile` is called before the compiler starts, and not where it need not.
 
@@ -240,8 +311,10 @@ def compile_scene(
     """
     includes = default_includes() if includes is None else tuple(includes)
     cache = default_cache() if cache is None else cache
-    compiler = find_compiler(cache)
+    requirement = requirement_of(scalar, platform.machine())
+    compiler = find_compiler(cache, requirement)
     flags = flags_for(platform.machine())
+    links = () if requirement is None else requirement.links
     key = hashlib.sha256(
         json.dumps(
             [
@@ -250,7 +323,7 @@ def compile_scene(
                 [(str(folder), _version_of_eigen(folder)) for folder in libraries],
                 compiler.command,
                 compiler.version,
-                flags,
+                [*flags, *links],
                 _processor_identity(),
             ]
         ).encode()
@@ -267,13 +340,13 @@ def compile_scene(
         _write_whole(kept_source, source.encode())
         on_compile()
         started = time.perf_counter()
-        _run_compiler(compiler, flags, includes, libraries, kept_source, library)
+        _run_compiler(compiler, flags, links, includes, libraries, kept_source, library)
         compile_s = time.perf_counter() - started
     return CompiledScene(
         library=library,
         source=kept_source,
         compiler=compiler.version,
-        flags=flags,
+        flags=(*flags, *links),
         processor=processor_name(),
         compile_s=compile_s,
         cached=cached,
@@ -300,6 +373,7 @@ def _forget_old_scenes(cache: Path) -> None:
 def _run_compiler(
     compiler: Compiler,
     flags: Sequence[str],
+    links: Sequence[str],
     includes: Sequence[Path],
     libraries: Sequence[Path],
     source: Path,
@@ -311,7 +385,7 @@ def _run_compiler(
         command += ["-I", str(folder)]
     for folder in libraries:
         command += ["-isystem", str(folder)]
-    command += ["-o", str(unfinished), str(source)]
+    command += ["-o", str(unfinished), str(source), *links]
     try:
         answer = subprocess.run(
             command, capture_output=True, text=True, errors="replace", check=False

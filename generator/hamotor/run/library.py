@@ -1,7 +1,7 @@
 """The compiled scene seen from Python: its C ABI, version 2, bound with ctypes.
 
-ARCHITECTURE.md states the ABI.  States and rows are contiguous float64 arrays; one row can be had
-in long double.
+ARCHITECTURE.md states the ABI.  States and rows are contiguous float64 arrays; for scalars with
+more digits than a double a run starts from decimals, and a row can be had as such.
 """
 
 from __future__ import annotations
@@ -10,7 +10,9 @@ import ctypes
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Context, Decimal
 from enum import IntEnum
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
@@ -26,7 +28,8 @@ ABI_VERSION = 2
 
 Vector = NDArray[np.float64]
 Rows = NDArray[np.float64]
-WideVector = NDArray[np.longdouble]
+Exact = tuple[Fraction, ...]
+"""Numbers with all digits of a wide scalar."""
 
 
 class Failure(IntEnum):
@@ -71,6 +74,7 @@ class Description:
     algebra: str
     group: str
     scalar: str
+    digits: int
     kernels: str
     compiler: str
     fma: bool
@@ -86,7 +90,7 @@ class Description:
     @property
     def is_wide(self) -> bool:
         """Whether the scalar has more digits than a double."""
-        return self.scalar == "long double"
+        return self.scalar not in {"double", "float"}
 
     @cached_property
     def column_index(self) -> dict[str, int]:
@@ -135,6 +139,7 @@ def describe(text: str) -> Description:
             algebra=said["algebra"],
             group=said["group"],
             scalar=said["scalar"],
+            digits=int(said["digits"]),
             kernels=said["kernels"],
             compiler=said["compiler"],
             fma=bool(said["fma"]),
@@ -194,7 +199,8 @@ class SceneLibrary:
             "hamotor_start": (run, [ctypes.c_char_p, number, number, number, numbers]),
             "hamotor_advance": (whole, [run, whole, whole, numbers]),
             "hamotor_observe": (None, [run, numbers]),
-            "hamotor_observe_wide": (None, [run, ctypes.c_void_p]),
+            "hamotor_start_text": (run, [ctypes.c_char_p, number, ctypes.c_char_p]),
+            "hamotor_observe_text": (whole, [run, ctypes.c_char_p, whole]),
             "hamotor_state": (None, [run, numbers]),
             "hamotor_drift": (None, [run, numbers]),
             "hamotor_steps": (whole, [run]),
@@ -209,14 +215,15 @@ class SceneLibrary:
         self,
         method: str,
         *,
-        step: float,
-        state: Sequence[float] | Vector,
+        step: float | Fraction,
+        state: Sequence[float | Fraction] | Vector,
         tolerance: float | None = None,
     ) -> LiveRun:
         """Begin a run at t = 0.
 
         `state`: shape (state_size,), per body the motor (body to world) and the momentum in the
-        body frame, physical units.  `step` in seconds.  `tolerance`, s⁻¹, is the local error per
+        body frame, physical units.  `step` in seconds.  A wide scalar takes fractions in all its
+        digits.  `tolerance`, s⁻¹, is the local error per
         unit of time of a method that chooses steps of its own.  Raises UsageError for an unknown
         method.
         """
@@ -227,9 +234,13 @@ class SceneLibrary:
                 f"the compiled scene wants ({self.description.state_size},)"
             )
         check_method(method, self.description.methods)
-        handle = self._c.hamotor_start(
-            method.encode(), 0.0, step, tolerance or 0.0, _pointer(initial)
-        )
+        if self.description.is_wide:
+            numbers = " ".join(map(_decimal, (0.0, step, *state)))
+            handle = self._c.hamotor_start_text(method.encode(), tolerance or 0.0, numbers.encode())
+        else:
+            handle = self._c.hamotor_start(
+                method.encode(), 0.0, float(step), tolerance or 0.0, _pointer(initial)
+            )
         if not handle:
             raise ToolError(f'the compiled scene would not start method "{method}"')
         return LiveRun(self._c, handle, self.description)
@@ -277,11 +288,16 @@ class LiveRun:
         self._c.hamotor_observe(self._handle, _pointer(row))
         return row
 
-    def observe_wide(self) -> WideVector:
-        """The same row with all digits that a C `long double` holds, shape (columns,)."""
-        row = np.empty(len(self.description.columns), dtype=np.longdouble)
-        self._c.hamotor_observe_wide(self._handle, row.ctypes.data)
-        return row
+    def observe_text(self) -> list[str]:
+        """The same row as decimals with all digits of the scalar."""
+        text = ctypes.create_string_buffer(len(self.description.columns) * _LONGEST_NUMBER)
+        self._c.hamotor_observe_text(self._handle, text, len(text))
+        return text.value.decode().split()
+
+    def observe_exactly(self) -> Exact | None:
+        """The same row in all digits of the scalar; None where a number is not finite."""
+        numbers = list(map(Decimal, self.observe_text()))
+        return tuple(map(Fraction, numbers)) if all(x.is_finite() for x in numbers) else None
 
     def state(self) -> Vector:
         """The state now, shape (state_size,)."""
@@ -310,6 +326,16 @@ class LiveRun:
         if self._handle:
             self._c.hamotor_stop(self._handle)
             self._handle = 0
+
+
+_LONGEST_NUMBER = 128
+_DIGITS = 62  # more than any scalar has
+
+
+def _decimal(x: float | Fraction) -> str:
+    exact = Fraction(x)
+    context = Context(prec=_DIGITS, Emin=-99999, Emax=99999)
+    return str(context.divide(Decimal(exact.numerator), Decimal(exact.denominator)))
 
 
 def _pointer(array: Rows) -> Any:

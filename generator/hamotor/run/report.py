@@ -10,13 +10,15 @@ import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Context, Decimal
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hamotor.run.attitude import Float, has_attitude, rotation_matrices
+from hamotor.run.attitude import has_attitude, rotation_matrices
 from hamotor.run.build import CompiledScene
 from hamotor.run.library import Description
 from hamotor.run.runner import Outcome
@@ -63,6 +65,7 @@ def report(
         "rows": outcome.rows,
         "t_end": float(outcome.final[0]),
         "scalar": description.scalar.replace(" ", "_"),
+        "digits": description.digits,
         "kernels": description.kernels,
         "representation": origin.representation,
         "status": outcome.status,
@@ -70,7 +73,7 @@ def report(
         "final": {
             body: final_state(body, description, outcome.final)
             if outcome.wide_final is None
-            else final_state(body, description, outcome.wide_final)
+            else final_state(body, description, np.array(outcome.wide_final))
             for body in description.bodies
         },
         "conserved": {
@@ -122,8 +125,12 @@ def report(
     return said
 
 
-def final_state(body: str, description: Description, row: NDArray[Float]) -> dict[str, Any]:
+def final_state(body: str, description: Description, row: NDArray[Any]) -> dict[str, Any]:
     """The state of one body in a row of the trajectory, as `run.json` tells it."""
+
+    def _number(x: Any) -> float | str:
+        return float(x) if isinstance(x, np.float64) else in_digits(x, description.digits)
+
     index = description.column_index
     motor = {blade: row[[index[f"{body}.motor.{blade}"]]] for blade in description.motor}
     turns = has_attitude(description.algebra, motor)
@@ -141,9 +148,13 @@ def final_state(body: str, description: Description, row: NDArray[Float]) -> dic
     }
 
 
-def _number(x: np.floating[Any]) -> float | str:
-    """A double as it is; a wider number as the shortest text that reads back as the same."""
-    return float(x) if isinstance(x, np.float64) else str(x)
+def in_digits(x: Fraction | int, digits: int) -> str:
+    """A number with so many significant digits."""
+    exact = Fraction(x)
+    quotient = Context(prec=digits, Emin=-99999, Emax=99999).divide(
+        Decimal(exact.numerator), Decimal(exact.denominator)
+    )
+    return f"{quotient.normalize(Context(prec=digits)):g}"
 
 
 def to_json(said: Mapping[str, Any]) -> str:

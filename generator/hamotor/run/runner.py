@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from types import FrameType, TracebackType
 from typing import Literal, Protocol
 
@@ -23,11 +24,11 @@ from hamotor.errors import NumericsError, UsageError
 from hamotor.run.library import (
     Conserved,
     Description,
+    Exact,
     LiveRun,
     Rows,
     SceneLibrary,
     Vector,
-    WideVector,
 )
 from hamotor.run.progress import NoProgress, Progress
 
@@ -74,6 +75,11 @@ class Plan:
     steps: int
     every: int
     asked_step: float
+
+    @property
+    def exact_step(self) -> Fraction:
+        """The step of wide scalars: the end is the decimal that it was given as."""
+        return Fraction(repr(self.end)) / self.steps
 
     @property
     def shortened(self) -> bool:
@@ -155,7 +161,7 @@ class Outcome:
     integrate_s: float
     problem: str = ""
     ladder: Ladder | None = None
-    wide_final: WideVector | None = None
+    wide_final: Exact | None = None
 
     @property
     def ns_per_step(self) -> float:
@@ -202,11 +208,19 @@ class _ConservedWatch:
         self._initial = initial[self._columns]
         self._scales = np.array([_scale(description, q, initial) for q in self._quantities])
         self._largest = np.zeros(len(self._quantities))
+        self._exact_initial: Exact | None = None
 
     def see(self, rows: Rows) -> None:
         if len(rows) and self._columns:
             change = np.abs(rows[:, self._columns] - self._initial).max(axis=0)
             self._largest = np.maximum(self._largest, change)
+
+    def see_exactly(self, row: Exact) -> None:
+        """Take a row in all digits, in place of doubles; the first one is the initial state."""
+        if self._exact_initial is None:
+            self._exact_initial = row
+        change = [abs(float(row[k] - self._exact_initial[k])) for k in self._columns]
+        self._largest = np.maximum(self._largest, change)
 
     def errors(self, final: Vector) -> dict[str, ConservedError]:
         worst = self._largest / np.where(self._scales > 0, self._scales, 1.0)
@@ -234,7 +248,7 @@ def _scale(description: Description, quantity: Conserved, initial: Vector) -> fl
 
 def integrate(
     library: SceneLibrary,
-    state: Sequence[float] | Vector,
+    state: Sequence[float | Fraction] | Vector,
     plan: Plan,
     recorder: Recorder,
     *,
@@ -250,7 +264,8 @@ def integrate(
     """
     interruption = Interruption() if interruption is None else interruption
     progress = NoProgress() if progress is None else progress
-    with library.start(plan.method, step=plan.step, state=state) as live:
+    step = plan.exact_step if library.description.is_wide else plan.step
+    with library.start(plan.method, step=step, state=state) as live:
         progress.begin(stage, plan.steps)
         try:
             return _step_in_chunks(live, plan, recorder, progress, interruption)
@@ -262,7 +277,7 @@ def integrate(
 def _step_in_chunks(
     live: LiveRun, plan: Plan, recorder: Recorder, progress: Progress, interruption: Interruption
 ) -> Outcome:
-    kept = _KeptRows(live.description, plan, recorder, live.observe())
+    kept = _KeptRows(live, plan, recorder)
     problem = ""
     interrupted = False
     done, chunk = 0, _FIRST_CHUNK_STEPS
@@ -273,6 +288,8 @@ def _step_in_chunks(
             interrupted = True
             break
         asked = min(chunk, plan.steps - done, _ROWS_PER_CHUNK * plan.every)
+        if live.description.is_wide:  # every row is the state after a chunk, in all digits
+            asked = min(asked, plan.every - done % plan.every)
         due = (done + asked) // plan.every - done // plan.every
         if due > len(buffer):
             buffer = np.empty((due, len(live.description.columns)))
@@ -305,31 +322,25 @@ def _step_in_chunks(
         total_drift=total,
         integrate_s=seconds,
         problem=problem,
-        wide_final=_wide(live, kept, done),
+        wide_final=kept.exact_last,
     )
 
 
-def _wide(live: LiveRun, kept: _KeptRows, done: int) -> WideVector | None:
-    if not live.description.is_wide:
-        return None
-    if kept.step < done:  # the state now is not the last row, which was rounded
-        return kept.last.astype(np.longdouble)
-    row = live.observe_wide()
-    row[0] = kept.last[0]
-    return row
-
-
 class _KeptRows:
-    """The rows recorded so far: `step` is the index of the last one, `last` the row itself."""
+    """The rows recorded so far: `step` is the index of the last one, `last` the row itself.
 
-    def __init__(
-        self, description: Description, plan: Plan, recorder: Recorder, initial: Vector
-    ) -> None:
-        self._columns = description.columns
+    `exact_last` is the same in all digits of a wide scalar, whose rows come one by one.
+    """
+
+    def __init__(self, live: LiveRun, plan: Plan, recorder: Recorder) -> None:
+        initial = live.observe()
+        self._live = live
+        self._columns = live.description.columns
         self._plan = plan
         self._recorder = recorder
         self.initial = self.last = initial
-        self.conserved = _ConservedWatch(description, initial)
+        self.exact_last: Exact | None = None
+        self.conserved = _ConservedWatch(live.description, initial)
         self.step = self.rows = 0
         if self.keep(initial[np.newaxis], np.zeros(1, dtype=np.int64)):
             name = self._columns[int(np.argmin(np.isfinite(initial)))].name
@@ -344,7 +355,12 @@ class _KeptRows:
         finite = np.isfinite(rows)
         good = len(rows) if finite.all() else int(np.argmin(finite.all(axis=1)))
         if good:
-            self.conserved.see(rows[:good])
+            exact = self._live.observe_exactly() if self._live.description.is_wide else None
+            if exact is None:
+                self.conserved.see(rows[:good])
+            else:
+                self.conserved.see_exactly(exact)
+                self.exact_last = exact
             self._recorder.append(rows[:good])
             self.rows += good
             self.step = int(steps[good - 1])
@@ -386,7 +402,7 @@ def _advice(plan: Plan) -> str:
 
 def meet_tolerance(
     library: SceneLibrary,
-    state: Sequence[float] | Vector,
+    state: Sequence[float | Fraction] | Vector,
     *,
     method: str,
     end: float,
@@ -498,7 +514,7 @@ def _hopeless(rungs: Sequence[Rung]) -> str:
 
 
 def first_step(
-    library: SceneLibrary, state: Sequence[float] | Vector, *, method: str, end: float
+    library: SceneLibrary, state: Sequence[float | Fraction] | Vector, *, method: str, end: float
 ) -> float:
     """A step to begin a ladder with, seconds: from how fast the initial state changes.
 

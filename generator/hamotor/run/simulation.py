@@ -6,6 +6,7 @@ import os
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from hamotor.scene import GeneralScene, Scene
     from hamotor.scene.building import BodyWords
 
-SCALARS = ("double", "float", "long_double")
 KERNELS = ("generated", "generic")
 REPRESENTATIONS = ("ga", "matrix")
 
@@ -61,6 +61,13 @@ class Simulation:
     read: Callable[[], Scene | GeneralScene] | None = None
     matrix_source: Callable[[str], str] | None = None
     """Gives the C++ text in the matrix representation, for a scalar."""
+    exact_digits: tuple[str, ...] = ()
+    """The initial state in 60 digits."""
+
+    @property
+    def exact_state(self) -> tuple[Fraction, ...]:
+        """The initial state in all digits that are known."""
+        return tuple(map(Fraction, self.exact_digits or map(repr, map(float, self.state))))
 
     def compile(
         self,
@@ -76,8 +83,10 @@ class Simulation:
         `method` is all that the scene offers if not given.  Raises UsageError for an unknown
         scalar, kernels, representation or method, ToolError when compilation fails.
         """
+        from hamotor.scene.scalars import parse_scalar
+
+        numbers = parse_scalar(scalar)
         for name, value, allowed in (
-            ("scalar", scalar, SCALARS),
             ("kernels", kernels, KERNELS),
             ("representation", representation, REPRESENTATIONS),
         ):
@@ -92,6 +101,11 @@ class Simulation:
                 raise UsageError("the matrix form has no kernels; leave --kernels out.")
             if self.matrix_source is None:
                 raise UsageError(f"{self.name}: has no matrix form.")
+            if numbers.name in {"quad", "mpfr"}:
+                raise UsageError(
+                    "the matrix form is stepped in double, float and long_double; "
+                    f"leave --scalar {numbers.name} or --representation matrix out."
+                )
             source = self.matrix_source(scalar)
         else:
             own_text = (method,) if method == "taylor" else ()
@@ -104,6 +118,7 @@ class Simulation:
         build = compile_scene(
             source,
             libraries=(eigen(),) if representation == "matrix" else (),
+            scalar=scalar,
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
         return Compiled(build, SceneLibrary(build.library), generate_s)
@@ -125,6 +140,7 @@ class Simulation:
         method: str | None = None,
         every: int | None = None,
         scalar: str = "double",
+        digits: int | None = None,
         kernels: str = "generated",
         representation: str = "ga",
         out: str | os.PathLike[str] | None = None,
@@ -140,6 +156,11 @@ class Simulation:
         norm.  Every `every`-th step is recorded, and always the first and the last state; with a
         tolerance, where the scene cannot know the steps, about two thousand rows if not given.
 
+        `scalar`: double, float, long_double, quad (33 digits) or mpfr (`digits` of them, 50 if not
+        given).  Those with more digits than a double take the scene's numbers in all digits that
+        they are written with; the final state of `run.json` then has all of them, as texts, and
+        errors of what is conserved are theirs, while the trajectory stays in doubles.
+
         `kernels` "generic" runs the same scene with nothing generated but its Hamiltonian: products
         of dense multivectors by table, slow, to compare with.
         `representation` "matrix" runs the scene in the classical form (R, x, Π, P) instead of
@@ -152,6 +173,10 @@ class Simulation:
         not met; RunInterrupted after Ctrl-C.  The last two carry in `.run` what was computed, which
         by then is also on disk.
         """
+        if digits is not None:
+            if scalar != "mpfr":
+                raise UsageError("digits are for the scalar mpfr.")
+            scalar = f"mpfr{digits}"
         if step is not None and tolerance is not None:
             raise UsageError("give a step or a tolerance, not both.")
         if csv and out is None:
@@ -194,7 +219,7 @@ class Simulation:
                     recorder = new_recorder()
                     outcome = integrate(
                         compiled.library,
-                        self.state,
+                        self.exact_state if description.is_wide else self.state,
                         planned,
                         recorder,
                         progress=shown,
@@ -203,7 +228,7 @@ class Simulation:
                 elif tolerance is not None:
                     outcome, recorder = meet_tolerance(
                         compiled.library,
-                        self.state,
+                        self.exact_state if description.is_wide else self.state,
                         method=method,
                         end=end,
                         tolerance=tolerance,
@@ -302,6 +327,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         parse_scene,
         scene_source,
     )
+    from hamotor.scene.exact import text
 
     contents, name, file = find_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
     kept = Remembered(default_cache(), key_of(contents, name, folder_of(scene)))
@@ -315,6 +341,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         return {
             "name": found.name,
             "state": list(map(float, found.initial_state)),
+            "exact_digits": list(map(text, found.exact_state)),
             "end": found.time.end,
             "step": found.time.step,
             "tolerance": found.time.tolerance,
@@ -335,7 +362,11 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
     known = kept.value("settings", settings)
     return Simulation(
-        **{**known, "state": np.array(known["state"])},
+        **{
+            **known,
+            "state": np.array(known["state"]),
+            "exact_digits": tuple(known["exact_digits"]),
+        },
         source=source,
         read=read,
         matrix_source=in_matrices,
@@ -346,6 +377,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
     """A Hamiltonian made in Python, ready to run; see `hamotor.scene.building.general_scene`."""
     from hamotor.scene import Form, methods_offered, scene_source
     from hamotor.scene.building import general_scene
+    from hamotor.scene.exact import text
     from hamotor.scene.matrix_source import matrix_source
 
     scene = general_scene(energy, bodies, **settings)
@@ -353,6 +385,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
         name=scene.name,
         source=lambda *choice: scene_source(scene, *choice),
         state=scene.initial_state,
+        exact_digits=tuple(map(text, scene.exact_state)),
         end=scene.time.end,
         step=scene.time.step,
         tolerance=None,

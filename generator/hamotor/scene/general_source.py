@@ -20,6 +20,7 @@ from hamotor.mechanics.system import System
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Scene
+from hamotor.scene.scalars import Scalar
 from hamotor.scene.source import literal_text, rendered, shortened, text_literal
 from hamotor.scene.taylor_source import refusal, required
 
@@ -63,7 +64,7 @@ class ProgramText:
 
 
 def general_source(
-    whole: Scene | GeneralScene, kernels: str, scalar: str, method: str | None = None
+    whole: Scene | GeneralScene, kernels: str, scalar: Scalar, method: str | None = None
 ) -> str:
     """The text of the C++ file that defines a scene over the runtime's headers.
 
@@ -100,7 +101,7 @@ def general_source(
         "general_scene.cpp.jinja",
         scene=scene,
         kernels=kernels,
-        scalar=scalar.replace("_", " "),
+        scalar=scalar,
         tables=_tables(first) if kernels == "generic" else None,
         headers=scene.headers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
@@ -154,7 +155,7 @@ def _tables(body: Coordinates) -> dict[str, Any]:
         }
 
     return {
-        "gram": [[literal_text(float(x), "") for x in row] for row in body.algebra.gram],
+        "gram": [[literal_text(float(x)) for x in row] for row in body.algebra.gram],
         "generators": [text_literal(g.name) for g in group.generators],
         "element": layout(group.element),
         "rate": layout(group.rate),
@@ -164,7 +165,7 @@ def _tables(body: Coordinates) -> dict[str, Any]:
 
 def _entries(rows: Sequence[Mapping[Blade, Rational]]) -> list[str]:
     return [
-        f"hamotor::generic::Entry{{{k}, {blade}, {literal_text(float(x), '')}}}"
+        f"hamotor::generic::Entry{{{k}, {blade}, {literal_text(float(x))}}}"
         for k, row in enumerate(rows)
         for blade, x in row.items()
     ]
@@ -250,10 +251,10 @@ def conserved_entry(scene: GeneralScene, quantity: Any, own: Sequence[Any]) -> d
         "unit": text_literal(quantity.unit),
         "description": text_literal(quantity.description),
         "body": names.index(quantity.body) if quantity.body else 0,
-        "coefficients": [literal_text(coefficients.get(g, 0.0), "") for g in scene.group.generators]
+        "coefficients": [literal_text(coefficients.get(g, 0.0)) for g in scene.group.generators]
         if coefficients
         else [],
         "norm": [text_literal(column) for column in quantity.norm],
-        "scale": literal_text(quantity.scale, ""),
+        "scale": literal_text(quantity.scale),
         "index": indices.index(quantity.name) if is_own else 0,
     }

@@ -30,6 +30,7 @@ from hamotor.scene.general_source import (
     motor_unit,
 )
 from hamotor.scene.model import Scene
+from hamotor.scene.scalars import parse_scalar
 from hamotor.scene.source import rendered, shortened, text_literal
 
 Expr = Any
@@ -55,7 +56,7 @@ def matrix_source(scene: Scene | GeneralScene, scalar: str) -> str:
     return rendered(
         "matrix_scene.cpp.jinja",
         scene=scene,
-        scalar=scalar.replace("_", " "),
+        scalar=parse_scalar(scalar).cpp,
         hamiltonian=shortened(str(scene.hamiltonian.energy)),
         dimension=form.dimension,
         translates=form.translates,

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from hamotor.errors import UsageError, suggest
 from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.exact import decimal
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Body, Scene
+from hamotor.scene.scalars import Scalar, parse_scalar
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 KERNELS = ("generated", "generic")
-SCALARS = {"double": "", "float": "F", "long_double": "L"}
-"""The scalar types a scene compiles for, with the suffix of their literals."""
 SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
 """Masses and moments beyond these have products that overflow in single precision."""
 
@@ -31,26 +32,26 @@ def scene_source(
     Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
     for numbers that do not fit the scalar.
     """
-    for what, value, allowed in (("kernels", kernels, KERNELS), ("scalar", scalar, tuple(SCALARS))):
-        if value not in allowed:
-            raise UsageError(
-                f'unknown {what} "{value}"; there is {", ".join(allowed)}.{suggest(value, allowed)}'
-            )
+    if kernels not in KERNELS:
+        raise UsageError(
+            f'unknown kernels "{kernels}"; there is {", ".join(KERNELS)}.'
+            f"{suggest(kernels, KERNELS)}"
+        )
+    numbers = parse_scalar(scalar)
     if not isinstance(scene, Scene) or kernels == "generic":
         from hamotor.scene.general_source import general_source
 
-        return general_source(scene, kernels, scalar, method)
+        return general_source(scene, kernels, numbers, method)
     if scalar == "float":
         _refuse_numbers_beyond_float(scene)
-    suffix = SCALARS[scalar]
     return rendered(
         "scene.cpp.jinja",
         scene=scene,
         kernels=kernels,
-        scalar=scalar.replace("_", " "),
+        scalar=numbers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
-        bodies=[_body(body, suffix) for body in scene.bodies],
-        interactions=_interactions(scene, suffix),
+        bodies=[_body(body, numbers) for body in scene.bodies],
+        interactions=_interactions(scene, numbers),
         potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
         recurrence=_recurrence(scene) if method == "taylor" else None,
@@ -90,15 +91,16 @@ def _refuse_numbers_beyond_float(scene: Scene) -> None:
                 )
 
 
-def literal_text(x: float, suffix: str) -> str:
-    """`x` as a C++ literal that reads back exactly; integers stay integers where they are short."""
-    if x == int(x) and abs(x) < 1e9:
-        return str(int(x))
-    return f"{x!r}{suffix}"
+def literal_text(x: float) -> str:
+    """`x` as a C++ literal of type double."""
+    return DOUBLE.literal(x)
 
 
-def _literals(numbers: Sequence[float], suffix: str) -> str:
-    return ", ".join(literal_text(x, suffix) for x in numbers)
+DOUBLE = Scalar("double")
+
+
+def _literals(values: Sequence[float], scalar: Scalar) -> str:
+    return ", ".join(map(scalar.literal, values))
 
 
 def text_literal(text: str) -> str:
@@ -106,20 +108,32 @@ def text_literal(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _body(body: Body, suffix: str) -> dict[str, Any]:
+def _body(body: Body, scalar: Scalar) -> dict[str, Any]:
     frame = body.principal
-    arguments = [literal_text(body.mass, suffix), f"{body.name}_moments"]
+    arguments = [scalar.literal(body.mass), f"{body.name}_moments"]
     if not body.group.translates:
         center = frame.from_body_frame(body.center_of_mass)
-        arguments += [f"{{{_literals(point, suffix)}}}" for point in (center, body.position)]
+        arguments += [f"{{{_literals(point, scalar)}}}" for point in (center, body.position)]
     return {
         "name": body.name,
         "type": "FreeBody" if body.group.translates else "PivotedBody",
         "is_principal": frame.is_body_frame,
-        "moments": [literal_text(x, suffix) for x in frame.moments],
-        "frame": _literals(frame.motor, suffix),
+        "moments": list(map(scalar.literal, frame.moments)),
+        "order": list(map(literal_text, _told_apart(frame.moments))),
+        "frame": _literals(frame.motor, scalar),
         "arguments": arguments,
     }
+
+
+def _told_apart(moments: Sequence[float]) -> list[float]:
+    """Doubles of moments: equal where these are, and nowhere else."""
+    found: list[float] = []
+    for k, x in enumerate(moments):
+        y = float(x)
+        while any(y == z and decimal(x) != decimal(moments[n]) for n, z in enumerate(found[:k])):
+            y = math.nextafter(y, math.inf)
+        found.append(y)
+    return found
 
 
 def _potential(scene: Scene) -> dict[str, Any] | None:
@@ -160,19 +174,19 @@ def shortened(text: str) -> str:
     return text if len(text) <= 400 else f"{text[:397]}..."
 
 
-def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
+def _interactions(scene: Scene, scalar: Scalar) -> list[dict[str, Any]]:
     interactions = []
     if scene.gravity is not None:
         interactions.append(
             {
                 "type": "UniformGravity<Group, Scalar>",
-                "members": [f".acceleration = {{{_literals(scene.gravity, suffix)}}}"],
+                "members": [f".acceleration = {{{_literals(scene.gravity, scalar)}}}"],
             }
         )
     number = {body.name: k for k, body in enumerate(scene.bodies)}
 
     def attached(name: str, at: Sequence[float]) -> str:
-        return f"{{{_literals(scene.body_of[name].principal.from_body_frame(at), suffix)}}}"
+        return f"{{{_literals(scene.body_of[name].principal.from_body_frame(at), scalar)}}}"
 
     for spring in scene.springs:
         slack = "zero" if spring.rest_length == 0 else "positive"
@@ -180,7 +194,7 @@ def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
         near = attached(spring.body, spring.at)
         if spring.other is None:
             kind = f"SpringToWorld<{number[spring.body]}, {common}>"
-            ends = [f".at = {near}", f".anchor = {{{_literals(spring.anchor or (), suffix)}}}"]
+            ends = [f".at = {near}", f".anchor = {{{_literals(spring.anchor or (), scalar)}}}"]
         else:
             kind = f"SpringBetween<{number[spring.body]}, {number[spring.other]}, {common}>"
             far = attached(spring.other, spring.other_at or ())
@@ -190,8 +204,8 @@ def _interactions(scene: Scene, suffix: str) -> list[dict[str, Any]]:
                 "type": kind,
                 "members": [
                     *ends,
-                    f".stiffness = {literal_text(spring.stiffness, suffix)}",
-                    f".rest_length = {literal_text(spring.rest_length, suffix)}",
+                    f".stiffness = {scalar.literal(spring.stiffness)}",
+                    f".rest_length = {scalar.literal(spring.rest_length)}",
                 ],
             }
         )
@@ -210,9 +224,9 @@ def _conserved(scene: Scene, quantity: ConservedQuantity) -> dict[str, Any]:
         "unit": text_literal(quantity.unit),
         "description": text_literal(quantity.description),
         "body": names.index(quantity.body) if quantity.body else 0,
-        "coefficients": [literal_text(coefficients.get(g, 0.0), "") for g in scene.group.generators]
+        "coefficients": [literal_text(coefficients.get(g, 0.0)) for g in scene.group.generators]
         if coefficients
         else [],
         "norm": [text_literal(column) for column in quantity.norm],
-        "scale": literal_text(quantity.scale, ""),
+        "scale": literal_text(quantity.scale),
     }

@@ -447,7 +447,9 @@ class Run {
 
  public:
   /// Starts from `state`: motors and momenta.
-  Run(const typename Methods::AnyOf& method, double time, double step, const double* state) noexcept
+  template <class Number>
+  Run(const typename Methods::AnyOf& method, const std::type_identity_t<Number>& time,
+      const std::type_identity_t<Number>& step, const Number* state) noexcept
       : method_(method), time_(S(time)), step_(S(step)) {
     for (std::size_t i = 0; i < n; ++i) {
       std::array<S, rotor_size> rotor{};
@@ -594,12 +596,12 @@ class Run {
     return to;
   }
 
-  template <class Values>
-  static void read(const double*& from, Values& values) noexcept {
+  template <class Number, class Values>
+  static void read(const Number*& from, Values& values) noexcept {
     for (S& x : values) x = static_cast<S>(*from++);
   }
-  template <int size>
-  static void read(const double*& from, Eigen::Matrix<S, size, 1>& values) noexcept {
+  template <class Number, int size>
+  static void read(const Number*& from, Eigen::Matrix<S, size, 1>& values) noexcept {
     for (Eigen::Index k = 0; k < size; ++k) values(k) = static_cast<S>(*from++);
   }
 

@@ -237,6 +237,13 @@ struct Limits<Float128> {
     return (Float128(2) - epsilon()) * Float128(0x1p+16383L);
   }
 };
+
+/// The scalar of 113 bits.
+using Quad = Float128;
+#define HAMOTOR_HAS_QUAD 1
+#elif LDBL_MANT_DIG == 113
+using Quad = long double;
+#define HAMOTOR_HAS_QUAD 1
 #endif
 
 namespace detail {

@@ -5,6 +5,7 @@
 // bodies stand in their principal frames.  Nothing throws across it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -12,13 +13,16 @@
 #include <cstdio>
 #include <limits>
 #include <new>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <tuple>
 #include <type_traits>
 #include <variant>
+#include <vector>
 
 #include "hamotor/methods.hpp"
+#include "hamotor/number_text.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/space.hpp"
 #include "hamotor/state.hpp"
@@ -195,6 +199,12 @@ template <class S>
     return "double";
   } else if constexpr (std::is_same_v<S, long double>) {
     return "long double";
+#ifdef HAMOTOR_HAS_QUAD
+  } else if constexpr (std::is_same_v<S, scalar::Quad>) {
+    return "quad";
+#endif
+  } else if constexpr (requires(S x) { x.text(); }) {
+    return "mpfr";
   } else {
     return "custom";
   }
@@ -353,6 +363,7 @@ template <class Scene>
          ", \"algebra\": " + json_string(Group::algebra) +
          ", \"group\": " + json_string(Group::name) +
          ", \"scalar\": " + json_string(scalar_name<typename Scene::Scalar>()) +
+         ", \"digits\": " + std::to_string(text_digits<typename Scene::Scalar>) +
          ", \"kernels\": " + json_string(Scene::kernels) +
          ", \"compiler\": " + json_string(compiler()) +
          ", \"fma\": " + (has_fused_multiply_add ? "true" : "false") +
@@ -423,9 +434,10 @@ class Run {
   static constexpr std::size_t n = System::bodies;
 
  public:
-  /// Starts from `state`, user's body frames.
-  Run(const typename MethodsOf<Scene>::AnyOf& method, double time, double step,
-      const double* state) noexcept
+  /// Starts from `state`, user's body frames; `Number` is double or the scene's scalar.
+  template <class Number>
+  Run(const typename MethodsOf<Scene>::AnyOf& method, const std::type_identity_t<Number>& time,
+      const std::type_identity_t<Number>& step, const Number* state) noexcept
       : method_(method), time_(S(time)), step_(S(step)) {
     for (std::size_t i = 0; i < n; ++i) {
       const Motor motor = Motor::from(read<motor_size<Scene>>(state));
@@ -558,7 +570,7 @@ class Run {
     if constexpr (requires { Scene::quantities(state_, time_); }) {
       return Scene::quantities(state_, now())[conserved.index];
     } else if constexpr (PlacedScene<Scene>) {
-      return std::numeric_limits<S>::quiet_NaN();
+      return S(std::numeric_limits<double>::quiet_NaN());
     } else {
       return casimir(conserved.quantity, conserved.body);
     }
@@ -576,11 +588,11 @@ class Run {
         if (quantity == Quantity::p_dot_pi) return detail::dot(p, pi);
       }
     }
-    return std::numeric_limits<S>::quiet_NaN();
+    return S(std::numeric_limits<double>::quiet_NaN());
   }
 
-  template <std::size_t size>
-  [[nodiscard]] static std::array<S, size> read(const double*& from) noexcept {
+  template <std::size_t size, class Number>
+  [[nodiscard]] static std::array<S, size> read(const Number*& from) noexcept {
     std::array<S, size> result{};
     for (S& x : result) x = static_cast<S>(*from++);
     return result;
@@ -627,6 +639,36 @@ template <class Scene>
   return new (std::nothrow) RunOf<Scene>(chosen, time, step, state);
 }
 
+/// `hamotor_start_text`: `numbers` are time, step and state as decimals, blanks between them.
+template <class Scene>
+[[nodiscard]] void* start(const char* method, double tolerance, const char* numbers) {
+  using S = typename Scene::Scalar;
+  typename MethodsOf<Scene>::AnyOf chosen;
+  if (method == nullptr || !MethodsOf<Scene>::choose(method, chosen)) return nullptr;
+  MethodsOf<Scene>::set_tolerance(tolerance, chosen);
+  std::vector<S> read;
+  std::istringstream words(numbers);
+  for (std::string word; words >> word;) read.push_back(number_from<S>(word));
+  if (read.size() != 2 + Scene::bodies.size() * body_size<Scene>) return nullptr;
+  return new (std::nothrow) RunOf<Scene>(chosen, read[0], read[1], &read[2]);
+}
+
+/// `hamotor_observe_text`: one row of columns in all digits, blanks between them; how many
+/// characters it has, of which at most `size` with a closing zero are written.
+template <class Scene>
+[[nodiscard]] std::int64_t observe_text(const RunOf<Scene>& run, char* text, std::int64_t size) {
+  std::array<typename Scene::Scalar, columns<Scene>()> row{};
+  run.observe(row.data());
+  std::string words;
+  for (const auto& x : row) words += text_of(x) + ' ';
+  words.pop_back();
+  if (size > 0) {
+    const auto kept = std::min(words.size(), static_cast<std::size_t>(size - 1));
+    text[words.copy(text, kept)] = '\0';
+  }
+  return static_cast<std::int64_t>(words.size());
+}
+
 }  // namespace scene
 }  // namespace hamotor
 
@@ -653,8 +695,14 @@ template <class Scene>
   HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {                     \
     static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                        \
   }                                                                                             \
-  HAMOTOR_SCENE_EXPORT void hamotor_observe_wide(const void* run, long double* row) {           \
-    static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                        \
+  HAMOTOR_SCENE_EXPORT void* hamotor_start_text(const char* method, double tolerance,           \
+                                                const char* numbers) {                          \
+    return hamotor::scene::start<Scene>(method, tolerance, numbers);                            \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int64_t hamotor_observe_text(const void* run, char* text,           \
+                                                         std::int64_t size) {                   \
+    return hamotor::scene::observe_text<Scene>(                                                 \
+        *static_cast<const hamotor::scene::RunOf<Scene>*>(run), text, size);                    \
   }                                                                                             \
   HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {                     \
     static_cast<const hamotor::scene::RunOf<Scene>*>(run)->read_state(state);                   \
