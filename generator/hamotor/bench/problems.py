@@ -110,7 +110,8 @@ def _computed(simulation: Simulation) -> Reference:
         steps = math.ceil(simulation.end / step) * factor
         with library.start(method, step=simulation.end / steps, state=simulation.state) as live:
             live.advance(steps, 0, None)
-            ends.append(endpoint.of_row(library.description, live.observe_wide()))
+            row = np.array(live.observe_text(), np.longdouble)
+            ends.append(endpoint.of_row(library.description, row))
     apart = endpoint.errors(ends[0], ends[1])
     shown = ", ".join(f"{name} {distance:.1e}" for name, distance in apart.items())
     return Reference(
