@@ -11,16 +11,21 @@ the initial state does not hold:
 * symmetric methods: forward and back again ends at the start;
 * a run in `float` is as good as its digits.
 
+Beside them: exp and log of every group around multiples of π, a run that must stop cleanly, and a
+mass that no scalar holds.
+
 A step too long for a method (an error beyond 0.1) is `unresolved`: all that is asked
 then is that numbers stay finite and that what is promised for every step holds.
 """
 
 from __future__ import annotations
 
+import ctypes
 import json
 import math
 import platform
 import sys
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -32,16 +37,18 @@ import numpy as np
 
 from hamotor import __version__
 from hamotor.errors import UsageError, suggest
-from hamotor.run.build import processor_name
+from hamotor.run.build import compile_scene, processor_name
 from hamotor.run.library import Vector
 from hamotor.run.result import Run, RunFailed
 from hamotor.run.simulation import Simulation, load
 from hamotor.scene import METHODS, Promise
 
+EDGES: Final = Path(__file__).resolve().parents[3] / "tests" / "bench" / "stability" / "edges.cpp"
+EDGE_BOUND: Final = 4.0
 CASES: Final = Path(__file__).resolve().parents[2] / "scenes" / "hard"
 QUICK: Final = ("rkmk4", "splitting2", "splitting8", "gauss8")
 """One method of each family."""
-REFERENCES: Final = ("splitting10", "gauss8", "rkmk54")
+REFERENCES: Final = ("splitting10", "rkmk87", "gauss8")
 """By preference; the first two that a scene offers make its reference."""
 WIDE: Final = "long_double"
 FINER: Final = (4, 8, 16)
@@ -97,6 +104,10 @@ def bench_stability(
                 f'no hard case "{case}"; there are {", ".join(known)}.{suggest(case, known)}'
             )
     told: list[dict[str, Any]] = []
+    checks: list[Check] = []
+    if not cases:
+        print("judging exp, log, stops and refusals", file=sys.stderr, flush=True)
+        checks = [*edges(), stop_of_an_overflow(), refusal_of_a_denormal_mass()]
     for case in cases or known:
         print(f"judging {case}", file=sys.stderr, flush=True)
         simulation = load(CASES / f"{case}.toml")
@@ -122,7 +133,9 @@ def bench_stability(
         "benchmark": "stability",
         "quick": quick,
         "cases": told,
-        "failed": [
+        "checks": [asdict(check) for check in checks],
+        "failed": [check.name for check in checks if not check.passed]
+        + [
             f"{case['case']} {row['method']}"
             for case in told
             for row in case["rows"]
@@ -144,6 +157,58 @@ def bench_stability(
 def case_names() -> list[str]:
     """The hard cases, in alphabetical order."""
     return sorted(file.stem for file in CASES.glob("*.toml"))
+
+
+@dataclass(frozen=True)
+class Check:
+    """Something that is no run of a case."""
+
+    name: str
+    passed: bool
+    found: str
+
+
+def edges() -> list[Check]:
+    """exp and log of each group at 0, next to it, and around multiples of π up to 4π.
+
+    Along every plane, all of it and with a little of every other generator.  exp is held against
+    long double, exp log M against M; errors in ε (1 + |X|) of the largest number of M.
+    """
+    library = ctypes.CDLL(str(compile_scene(EDGES.read_text(encoding="utf-8")).library))
+    library.edge_groups.restype = ctypes.c_char_p
+    groups = library.edge_groups().decode().split()
+    errors = (ctypes.c_double * (2 * len(groups)))()
+    library.edge_errors(errors)
+    return [
+        Check(f"{function} {group}", error <= EDGE_BOUND, f"{error:.2g} units")
+        for group, *both in zip(groups, errors[::2], errors[1::2], strict=True)
+        for function, error in zip(("exp", "log"), both, strict=True)
+    ]
+
+
+def stop_of_an_overflow() -> Check:
+    """A body that expands by e³ a second, until its numbers overflow."""
+    expanding = load(CASES / "expanding.toml")
+    try:
+        run = expanding.run(end=1e4, step=0.01, method="rkmk4", every=1000)
+    except RunFailed as failed:
+        message, kept = str(failed), failed.run.t[-1]
+        told = "non-finite" in message and "step" in message and "blob." in message
+        return Check("stop of an overflow", told and bool(kept > 0), f"kept {kept:g} s: {message}")
+    return Check("stop of an overflow", False, f"went on to t = {run.t[-1]:g} s")
+
+
+def refusal_of_a_denormal_mass() -> Check:
+    """A mass below what products of two keep finite is refused, by name."""
+    text = (CASES / "tiny_mass.toml").read_text(encoding="utf-8").replace("1e-35", "1e-310")
+    with tempfile.TemporaryDirectory() as folder:
+        scene = Path(folder) / "denormal.toml"
+        scene.write_text(text, encoding="utf-8")
+        try:
+            load(scene)
+        except UsageError as refused:
+            return Check("refusal of a denormal mass", "mass" in str(refused), str(refused))
+    return Check("refusal of a denormal mass", False, "was accepted")
 
 
 def reference_of(simulation: Simulation) -> Reference:
@@ -353,6 +418,10 @@ def table(account: Mapping[str, Any]) -> str:
             )
             lines.append(f"  {row['method']:<14}{cells}  {row['verdict']}")
             lines += [f"    {failure}" for failure in row["failures"]]
+        lines.append("")
+    for check in account["checks"]:
+        lines.append(f"{check['name']}: {check['found']}: {'pass' if check['passed'] else 'fail'}")
+    if account["checks"]:
         lines.append("")
     rows = [row for case in account["cases"] for row in case["rows"]]
     count = Counter(row["verdict"] for row in rows)

@@ -39,6 +39,7 @@ class Failure(IntEnum):
     NOT_FINITE = 1
     NO_CONVERGENCE = 2
     STEP_TOO_SHORT = 3
+    LEFT_GROUP = 4
 
 
 @dataclass(frozen=True)

@@ -514,6 +514,10 @@ class Run {
         component_ = first_not_finite(state);
         return done;
       }
+      if (method.drift().largest > S(largest_defect)) {
+        failure_ = Failure::left_group;
+        return done;
+      }
       state_ = state;
       drift_ = method.drift();
       if constexpr (PoweredSystem<System>) work_ = method.work();

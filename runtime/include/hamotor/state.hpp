@@ -210,13 +210,18 @@ concept ErrorControlled = requires(Method method, const Method& constant, const 
   { constant.steps() } -> std::convertible_to<long long>;
 };
 
-/// Why a stepper could not take a step.  The momenta it delivers are then not numbers.
+/// Why a run could not take a step.  What a stepper says so of has momenta that are not numbers.
 enum class Failure {
   none,
   not_finite,      ///< the motion left the finite numbers, or the system has none there
   no_convergence,  ///< the iteration for an implicit step did not settle
-  step_too_short   ///< the tolerance would need steps below rounding of the time
+  step_too_short,  ///< the tolerance would need steps below rounding of the time
+  left_group       ///< |M M~ − 1| before the projection was so large that M is no motor any more
 };
+
+/// What |M M~ − 1| may be before a step's projection, which is then still one: of dilations and
+/// boosts by more than 1/ε, M holds too few digits for that.
+inline constexpr double largest_defect = 0.5;
 
 /// Why a stepper's last step failed: what `failure()` says where the stepper has it.
 template <class Method>

@@ -1,0 +1,103 @@
+"""The benchmark of hard cases: what it passes, and that it fails what breaks its promises."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hamotor.bench import bench_stability, stability
+from hamotor.errors import UsageError
+from hamotor.run.simulation import Simulation, load
+from hamotor.scene import METHODS, Promise
+from hamotor.scene.methods import ALL
+
+
+ILL_CONDITIONED = {"log pga4::SO4", "log pga4::SE4", "log cga3::Sim3", "log cga3::SO41"}
+"""In two planes that commute: where one has made a full turn, the other's part is lost with its sine."""
+
+
+@pytest.fixture(scope="module")
+def needle() -> Simulation:
+    return load(stability.CASES / "needle.toml")
+
+
+@pytest.fixture(scope="module")
+def reference(needle: Simulation) -> stability.Reference:
+    return stability.reference_of(needle)
+
+
+def test_every_case_says_what_is_hard_and_has_a_step() -> None:
+    assert len(stability.case_names()) >= 18
+    for name in stability.case_names():
+        case = load(stability.CASES / f"{name}.toml")
+        assert case.step is not None
+        assert case.read is not None
+        assert case.read().description, name
+
+
+def test_an_unknown_case_is_an_error() -> None:
+    with pytest.raises(UsageError, match=r'no hard case "neddle".*Did you mean "needle"'):
+        bench_stability(["neddle"])
+
+
+def test_condition_and_reference(needle: Simulation, reference: stability.Reference) -> None:
+    # A needle turns about its axis as its momentum there says, divided by a millionth.
+    assert 1e5 < reference.condition < 1e8
+    assert reference.agreement < 1e-10
+    pushed = stability.perturbed(needle, 1e-3, 1)
+    assert 0 < stability.distance(pushed, needle.state, needle) <= 1e-3
+
+
+def test_a_splitting_passes(needle: Simulation, reference: stability.Reference) -> None:
+    row = stability.judged("needle", needle, reference, "splitting2")
+    assert row.verdict == "pass", row.failures
+    assert row.figures["momenta"] < 1e-14
+    assert row.figures["reversal"] < 1e-12
+
+
+def test_a_promise_that_is_not_kept_fails(
+    needle: Simulation, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert next(m for m in METHODS if m.name == "rk4").promises == Promise.NOTHING
+    promising = tuple(replace(m, promises=ALL) for m in METHODS)
+    monkeypatch.setattr(stability, "METHODS", promising)
+    row = stability.judged("needle", needle, reference, "rk4")
+    assert row.verdict == "fail"
+    assert any("from the start" in failure for failure in row.failures)
+
+
+def test_a_wrong_order_fails(needle: Simulation, reference: stability.Reference) -> None:
+    elsewhere = replace(reference, end=reference.end + 1e-3)
+    row = stability.judged("needle", needle, elsewhere, "splitting2")
+    assert row.verdict == "fail"
+    assert any("falls to" in failure for failure in row.failures)
+
+
+def test_exp_and_log_at_their_edges() -> None:
+    checks = {check.name: check for check in stability.edges()}
+    assert len(checks) == 26
+    for name, check in checks.items():
+        assert check.passed or name in ILL_CONDITIONED, (name, check.found)
+
+
+def test_what_overflows_stops_and_what_is_denormal_is_refused() -> None:
+    assert stability.stop_of_an_overflow().passed
+    assert stability.refusal_of_a_denormal_mass().passed
+
+
+def test_table() -> None:
+    row = {"method": "rk4", "verdict": "fail", "figures": {"error": 0.5}, "failures": ["too far"]}
+    case = {
+        "case": "needle",
+        "description": "thin",
+        "end": 1.0,
+        "step": 0.1,
+        "condition": 10.0,
+        "reference": "a and b",
+        "reference_agreement": 1e-16,
+        "rows": [row, {**row, "verdict": "pass", "failures": []}],
+    }
+    text = stability.table({"cases": [case], "checks": []})
+    assert "    too far\n" in text
+    assert "2 judged: 1 pass, 0 unresolved" in text
