@@ -12,9 +12,8 @@ from hamotor.run.simulation import Simulation, load
 from hamotor.scene import METHODS, Promise
 from hamotor.scene.methods import ALL
 
-
 ILL_CONDITIONED = {"log pga4::SO4", "log pga4::SE4", "log cga3::Sim3", "log cga3::SO41"}
-"""In two planes that commute: where one has made a full turn, the other's part is lost with its sine."""
+"""Two planes commute: where one has made a full turn, the other's part is lost with its sine."""
 
 
 @pytest.fixture(scope="module")
