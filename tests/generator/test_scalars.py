@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import json
 import re
+from decimal import Context, Decimal
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.generator.test_general_scenes import SCENES as ORACLES
+from tests.generator.test_general_scenes import ascending, oracle, oracle_text
 
 import hamotor
+from hamotor.cli import main
 from hamotor.errors import ToolError, UsageError
 from hamotor.run import build
+from hamotor.scene.reading import parse_scene
 from hamotor.scene.scalars import NAMES, parse_scalar
 
 SCENE = """
@@ -139,3 +144,51 @@ def test_constants_of_formulas_have_their_digits_in_the_source(tmp_path: Path) -
     found = re.search(r'number<S>\((.*)L, \[\] \{ return "(.*)"; \}\)', text)
     assert found is not None
     assert abs(Fraction(found[2]) ** 2 - 2) < Fraction(1, 10**58)
+
+
+QUICK = "03_heavy_top_cl3"
+"""The oracle that is cheapest to compile; the others take a minute together."""
+
+
+def digits(x: Fraction) -> str:
+    """A number of finitely many decimals, written out."""
+    return str(Context(prec=60).divide(Decimal(x.numerator), Decimal(x.denominator)))
+
+
+def physical_digits(group: Any, core: Any) -> tuple[list[Fraction], list[Fraction]]:
+    """The components of M and, physical, of μ: generators are −½ of the blades, ½ for e0i."""
+    motor = [sign * Fraction(core["M"][name]) for name, sign in map(ascending, group.motor)]
+    momentum = [
+        Fraction(1 if g == "e0i" else -1, 2) * Fraction(core["mu"][f"(e{g[1]}^e{g[2]})*"])
+        for g in group.generators
+    ]
+    return motor, momentum
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.long] if n != QUICK else []) for n in ORACLES]
+)
+def test_an_oracle_is_met_in_25_digits(name: str, tmp_path: Path) -> None:
+    text = oracle_text(name)
+    group = parse_scene(text.encode(), name="oracle", file="oracle.toml").group
+    motor, momentum = physical_digits(group, oracle(name)["initial"])
+    given = ""
+    for key, names, values in (
+        ("motor", group.motor, motor),
+        ("momentum", group.generators, momentum),
+    ):
+        listed = ", ".join(f"{n} = {digits(x)}" for n, x in zip(names, values, strict=True))
+        given += f"{key} = {{ {listed} }}\n"
+    text = re.sub(r"^(position|velocity|angular_velocity) = .*\n", "", text, flags=re.MULTILINE)
+    text = re.sub(r'^(name = "(?:body|top)"\n)', rf"\1{given}", text, flags=re.MULTILINE)
+    (tmp_path / "oracle.toml").write_text(text)
+    for state in oracle(name)["states"]:
+        command = [*f"run {tmp_path}/oracle.toml --scalar quad --method taylor".split()]
+        command += [*f"--step {state['t']} --end {state['t']} --out {tmp_path}/out".split()]
+        assert main([*command, "--no-pictures"]) == 0
+        said = json.loads((tmp_path / "out" / "run.json").read_text())
+        (final,) = said["final"].values()
+        found = map(Fraction, [*final["motor"].values(), *final["momentum"].values()])
+        wanted = [x for part in physical_digits(group, state) for x in part]
+        for a, b in zip(found, wanted, strict=True):
+            assert float(abs(a - b)) <= 1e-25 * max(1.0, abs(float(b))), state["t"]

@@ -11,6 +11,7 @@
 #include <compare>
 #include <concepts>
 #include <cstddef>
+#include <limits>
 #include <string>
 #include <string_view>
 
@@ -43,6 +44,11 @@ class Mpfr {
   [[nodiscard]] static Mpfr from_text(std::string_view text) {
     return made(
         [&](mpfr_ptr to) { mpfr_strtofr(to, std::string(text).c_str(), nullptr, 10, rounding); });
+  }
+
+  /// 2^exponent.
+  [[nodiscard]] static Mpfr power_of_two(long exponent) noexcept {
+    return made([&](mpfr_ptr to) { mpfr_set_ui_2exp(to, 1, exponent, rounding); });
   }
 
   [[nodiscard]] static Mpfr pi() noexcept {
@@ -153,7 +159,11 @@ struct scalar::Limits<Mpfr<decimal_digits>> {
   static constexpr int digits = Mpfr<decimal_digits>::bits;
   static constexpr int max_exponent = std::numeric_limits<int>::max();
   static Mpfr<decimal_digits> epsilon() noexcept {
-    return constant([] { return power_of_two<Mpfr<decimal_digits>>(1 - digits); });
+    return Mpfr<decimal_digits>::power_of_two(1 - digits);
+  }
+  /// A number larger than any that means something: the largest has 2^62 bits before the point.
+  static Mpfr<decimal_digits> max() noexcept {
+    return Mpfr<decimal_digits>::power_of_two(max_exponent);
   }
 };
 

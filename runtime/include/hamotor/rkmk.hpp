@@ -168,7 +168,7 @@ class Rkmk {
       }
     }
   };
-  static constexpr Table table{};
+  static inline const Table table{};
 
   /// h Σ c_r slope_r over the first `count` stages.
   [[nodiscard]] constexpr Sum combined(const std::array<S, stages>& c,

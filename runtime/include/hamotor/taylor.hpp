@@ -51,7 +51,7 @@ class Taylor {
   /// Asks for this local error a unit of time, s⁻¹, relative to motors and momenta; the rounding
   /// of the scalar bounds it below.
   constexpr void set_tolerance(const S& tolerance) noexcept {
-    constexpr S least = scalar::Limits<S>::epsilon();
+    const S least = scalar::Limits<S>::epsilon();
     tolerance_ = select(tolerance > least, tolerance, least);
     // −½ ln ε = ½ ln 2 · log₂ 1/ε.
     int bits = 0;
@@ -229,7 +229,7 @@ class Taylor {
     const auto p = static_cast<std::size_t>(length_);
     const std::array<Sizes, 3> first{sizes(0), sizes(1), sizes(2)};
     const std::array<Sizes, 3> last{sizes(p - 2), sizes(p - 1), sizes(p)};
-    constexpr S unlimited = scalar::Limits<S>::max();
+    const S unlimited = scalar::Limits<S>::max();
     // A coordinate that passes through zero is as large as it becomes within a part of the
     // series' radius.
     S radius = unlimited;
