@@ -126,6 +126,48 @@ constexpr auto two_bodies_se2() {
                                                             .rest_length = S(0.4)}}};
 }
 
+inline constexpr std::array<double, 3> top_moments{0.6, 0.6, 0.4};
+inline constexpr std::array<std::array<double, 3>, 1> on_its_axis{{{0, 0, 0.5}}};
+
+/// A top on its tip in a uniform field.
+template <class S = double>
+constexpr auto symmetric_top() {
+  return RigidBodies{
+      std::tuple{PivotedBody<SO3, S, rotation_split(top_moments, on_its_axis)>(
+          S(1.1), in<S>(top_moments), in<S>(on_its_axis[0]), {S(0.3), S(-0.4), S(0.2)})},
+      std::tuple{UniformGravity<SO3, S>{{S(0.4), S(0.5), S(-2.5)}}}};
+}
+
+/// The same without what makes it a top: its spin and Rᵀg are stepped with everything else.
+template <class S = double>
+constexpr auto symmetric_body_on_a_pivot() {
+  return RigidBodies{
+      std::tuple{PivotedBody<SO3, S, rotation_split(top_moments)>(
+          S(1.1), in<S>(top_moments), in<S>(on_its_axis[0]), {S(0.3), S(-0.4), S(0.2)})},
+      std::tuple{UniformGravity<SO3, S>{{S(0.4), S(0.5), S(-2.5)}}}};
+}
+
+/// A symmetric body that hangs by its axis from a spring.
+template <class S = double>
+constexpr auto spinning_pendulum() {
+  return RigidBodies{
+      std::tuple{
+          FreeBody<SE3, S, rotation_split(top_moments, on_its_axis)>(S(1.1), in<S>(top_moments))},
+      std::tuple{UniformGravity<SE3, S>{{S(0.3), S(0), S(-0.98)}},
+                 SpringToWorld<0, SE3, S>{.at = hamotor::point<SE3>(in<S>(on_its_axis[0])),
+                                          .anchor = {S(0.2), S(0.1), S(2)},
+                                          .stiffness = S(6),
+                                          .rest_length = S(0.8)}}};
+}
+
+/// A free body that a hundredth makes asymmetric.
+template <class S = double>
+constexpr auto nearly_symmetric_so3() {
+  constexpr std::array<double, 3> moments_of_it{0.5, 0.505, 0.9};
+  return RigidBodies{std::tuple{PivotedBody<SO3, S, rotation_split(moments_of_it)>(
+      S(1), in<S>(moments_of_it), {S(0), S(0), S(0)}, {S(0), S(0), S(0)})}};
+}
+
 /// A state with nothing special about it.
 template <class System>
 hamotor::StateOf<System> generic_state(const System&) {

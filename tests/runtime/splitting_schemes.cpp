@@ -139,6 +139,70 @@ TEST(BlanesMoan, meets_the_conditions_of_runge_kutta_nystrom_methods) {
   EXPECT_GT(nystrom_defect<hamotor::BlanesMoan6>(8), 1e-9L);
 }
 
+/// Largest coefficient of Π exp(a_k A) exp(b_k B) − exp(A + B) over the words in A and B that
+/// `counts(As, Bs)`: A and B are unrelated.
+template <class Scheme, class Counts>
+Wide two_flow_defect(int degree, Counts counts) {
+  const auto [inner, outer] = Scheme::template weights<Wide>();
+  std::vector<Word> words{{}};
+  for (std::size_t k = 0; k < words.size(); ++k) {
+    for (const int letter : {0, 1}) {
+      if (static_cast<int>(words[k].size()) == degree) break;
+      Word longer = words[k];
+      longer.push_back(letter);
+      words.push_back(longer);
+    }
+  }
+  std::map<Word, Wide> product;
+  product[{}] = 1;
+  const auto multiply = [&](int letter, Wide step) {
+    std::map<Word, Wide> next;
+    for (const Word& word : words) {
+      Wide sum = product[word];
+      Wide factor = 1;
+      Word head = word;
+      for (int power = 1; !head.empty() && head.back() == letter; ++power) {
+        head.pop_back();
+        factor *= step / static_cast<Wide>(power);
+        sum += factor * product[head];
+      }
+      next[word] = sum;
+    }
+    product = next;
+  };
+  for (std::size_t k = 0; k < inner.size(); ++k) {
+    multiply(0, outer[k]);
+    multiply(1, inner[k]);
+  }
+  multiply(0, outer.back());
+  Wide worst = 0;
+  for (const Word& word : words) {
+    const auto inners = std::count(word.begin(), word.end(), 1);
+    const auto size = static_cast<int>(word.size());
+    if (!counts(size - static_cast<int>(inners), static_cast<int>(inners))) continue;
+    Wide exact = 1;
+    for (int k = 2; k <= size; ++k) exact /= static_cast<Wide>(k);
+    worst = std::max(worst, std::abs(product[word] - exact));
+  }
+  return worst;
+}
+
+TEST(BlanesMoan, meets_the_conditions_of_two_flows_in_turn) {
+  const auto all = [](int, int) { return true; };
+  EXPECT_LT(two_flow_defect<hamotor::BlanesMoanFree4>(4, all), 1e-17L);
+  EXPECT_LT(two_flow_defect<hamotor::BlanesMoanFree6>(6, all), 1e-17L);
+  EXPECT_GT(two_flow_defect<hamotor::BlanesMoanFree4>(5, all), 1e-7L);
+  EXPECT_GT(two_flow_defect<hamotor::BlanesMoanFree6>(7, all), 1e-8L);
+}
+
+TEST(Blanes864, is_of_order_8_6_and_4_in_powers_of_the_inner_flow) {
+  const auto counts = [](int outers, int inners) {
+    return outers + inners <= (inners < 2 ? 8 : inners == 2 ? 6 : 4);
+  };
+  EXPECT_LT(two_flow_defect<hamotor::Blanes864>(8, counts), 1e-17L);
+  EXPECT_GT(two_flow_defect<hamotor::Blanes864>(5, [](int, int) { return true; }), 1e-6L);
+}
+
 TEST(Decimal, is_read_to_the_last_place) {
   EXPECT_EQ(hamotor::detail::decimal<double>("0.25"), 0.25);
   EXPECT_EQ(hamotor::detail::decimal<Wide>("-0.3"), -0.3L);

@@ -135,6 +135,56 @@ TEST(RotationSplit, takes_the_middle_moment_out) {
   EXPECT_EQ(hamotor::rotation_split(std::array<double, 3>{2, 3, 1}), (RotationSplit{0, 2, 1, 2}));
 }
 
+TEST(RotationSplit, leaves_the_spin_apart_where_forces_act_on_the_axis) {
+  using Points = std::array<std::array<double, 3>, 2>;
+  constexpr std::array<double, 3> symmetric{2, 2, 1};
+  constexpr std::array<double, 3> asymmetric{2, 3, 1};
+  constexpr Points on_axis{{{0, 0, 1}, {0, 0, -2}}};
+  constexpr Points beside_it{{{0, 0, 1}, {0.1, 0, 0}}};
+  EXPECT_TRUE(hamotor::rotation_split(symmetric, on_axis).spin_apart);
+  EXPECT_FALSE(hamotor::rotation_split(symmetric, beside_it).spin_apart);
+  EXPECT_FALSE(hamotor::rotation_split(asymmetric, on_axis).spin_apart);
+  EXPECT_FALSE(hamotor::rotation_split(symmetric).spin_apart);
+}
+
+TEST(RotationSplit, knows_a_nearly_symmetric_body) {
+  const auto split = hamotor::rotation_split(std::array<double, 3>{1, 1.0001, 1.9});
+  EXPECT_TRUE(split.nearly_symmetric);
+  EXPECT_EQ(split.inner, 0);
+  EXPECT_FALSE(hamotor::rotation_split(std::array<double, 3>{1, 2, 3}).nearly_symmetric);
+}
+
+TEST(HalfAngle, has_all_digits_of_any_angle) {
+  using hamotor::HalfAngle;
+  using Wide = long double;
+  double worst = 0;
+  const auto expect_close = [&](double x) {
+    const auto half = HalfAngle<double>::of(x);
+    const Wide sine = std::sin(static_cast<Wide>(x));
+    const Wide quarter = std::sin(static_cast<Wide>(x) / 2);
+    worst = std::max({worst, static_cast<double>(std::abs((half.sine - sine) / sine)),
+                      static_cast<double>(std::abs((half.cosine_less_one + 2 * quarter * quarter) /
+                                                   (2 * quarter * quarter)))});
+  };
+  for (int k = 1; k < 4000; ++k) {
+    expect_close(k * 1.9e-4);
+    expect_close(-k * 1.9e-4);
+    expect_close(std::ldexp(1.1, -k / 8));
+  }
+  EXPECT_LT(worst, 3e-16);
+  for (int k = 1; k < 4000; ++k) {
+    for (const double x : {k * 0.0113, -k * 1.7, k * 1.1e5, -k * 3e7}) {
+      const auto half = HalfAngle<double>::of(x);
+      EXPECT_NEAR(half.sine, static_cast<double>(std::sin(static_cast<Wide>(x))), 2.3e-16);
+      EXPECT_NEAR(half.cosine_less_one, static_cast<double>(std::cos(static_cast<Wide>(x)) - 1),
+                  4.5e-16);
+    }
+  }
+  EXPECT_EQ(HalfAngle<double>::of(0).sine, 0);
+  EXPECT_EQ(HalfAngle<double>::of(0).cosine_less_one, 0);
+  EXPECT_TRUE(std::isnan(HalfAngle<double>::of(std::nan("")).sine));
+}
+
 TEST(RotationSplit, a_symmetry_saves_rotations) {
   EXPECT_EQ(hamotor::rotation_split(std::array<double, 3>{2, 2, 1}), (RotationSplit{0, 2, 1, 1}));
   EXPECT_EQ(hamotor::rotation_split(std::array<double, 3>{1, 2, 2}), (RotationSplit{1, 0, 2, 1}));

@@ -12,6 +12,7 @@ from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.exact import decimal
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.model import Body, Scene
+from hamotor.scene.motors import Vector
 from hamotor.scene.scalars import Scalar, parse_scalar
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
@@ -50,7 +51,7 @@ def scene_source(
         kernels=kernels,
         scalar=numbers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
-        bodies=[_body(body, numbers) for body in scene.bodies],
+        bodies=[_body(scene, body, numbers) for body in scene.bodies],
         interactions=_interactions(scene, numbers),
         potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
@@ -108,8 +109,9 @@ def text_literal(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _body(body: Body, scalar: Scalar) -> dict[str, Any]:
+def _body(scene: Scene, body: Body, scalar: Scalar) -> dict[str, Any]:
     frame = body.principal
+    forced = _where_forces_act(scene, body)
     arguments = [scalar.literal(body.mass), f"{body.name}_moments"]
     if not body.group.translates:
         center = frame.from_body_frame(body.center_of_mass)
@@ -122,6 +124,7 @@ def _body(body: Body, scalar: Scalar) -> dict[str, Any]:
         "order": list(map(literal_text, _told_apart(frame.moments))),
         "frame": _literals(frame.motor, scalar),
         "arguments": arguments,
+        "forced": [", ".join(map(literal_text, map(float, point))) for point in forced],
     }
 
 
@@ -134,6 +137,20 @@ def _told_apart(moments: Sequence[float]) -> list[float]:
             y = math.nextafter(y, math.inf)
         found.append(y)
     return found
+
+
+def _where_forces_act(scene: Scene, body: Body) -> list[Vector]:
+    """The points of the principal frame, beside its origin, where forces act on a body in space.
+
+    None are given where they are not known.
+    """
+    if scene.group.dimension != 3 or scene.potential is not None:
+        return []
+    points = [spring.at for spring in scene.springs if spring.body == body.name]
+    points += [spring.other_at or () for spring in scene.springs if spring.other == body.name]
+    if scene.gravity is not None and not body.group.translates:
+        points.append(body.center_of_mass)
+    return [body.principal.from_body_frame(point) for point in points]
 
 
 def _potential(scene: Scene) -> dict[str, Any] | None:

@@ -130,6 +130,64 @@ struct SofroniouSpaletta10 {
       "0.04967437063972987905456880066666479460188"};
 };
 
+/// Two flows in turn, whatever they are, order 4, six parts (Blanes & Moan 2002, S₆).
+struct BlanesMoanFree4 {
+  static constexpr int order = 4;
+  static constexpr std::size_t stages = 6;
+
+  template <class S>
+  [[nodiscard]] static constexpr SplittingWeights<S, stages> weights() noexcept {
+    return {detail::symmetric_weights<S, 6>(
+                std::array<std::string_view, 2>{"0.2095151066133620212740726400295010169021",
+                                                "-0.1438517731798180082751150578565277256482"}),
+            detail::symmetric_weights<S, 7>(
+                std::array<std::string_view, 3>{"0.07920369643119566943366349588826887330802",
+                                                "0.3531729060497739884810613115731210565304",
+                                                "-0.04206508035771953536811029830251703872041"})};
+  }
+};
+
+/// Two flows in turn, whatever they are, order 6, ten parts (Blanes & Moan 2002, S₁₀).
+struct BlanesMoanFree6 {
+  static constexpr int order = 6;
+  static constexpr std::size_t stages = 10;
+
+  template <class S>
+  [[nodiscard]] static constexpr SplittingWeights<S, stages> weights() noexcept {
+    return {detail::symmetric_weights<S, 10>(
+                std::array<std::string_view, 4>{"0.1488164479010432319209010055355775888774",
+                                                "-0.1323858657677836474488454265989399215745",
+                                                "0.06730760469218445815025789659260104689936",
+                                                "0.4326664025781735975276679708835452980582"}),
+            detail::symmetric_weights<S, 11>(
+                std::array<std::string_view, 5>{"0.05026276440039268602122165440207410940601",
+                                                "0.4135143004283438150630637201338844389753",
+                                                "0.04507988979439806296889705212451347116172",
+                                                "-0.1880548538195689147991284889188705424878",
+                                                "0.5419606784507801348314147409330724963482"})};
+  }
+};
+
+/// Two flows in turn of which the inner is ε times the outer: error O(ε h⁸ + ε² h⁶ + ε³ h⁴), seven
+/// parts (Blanes, Casas, Farrés, Laskar, Makazaga & Murua 2013, ABA864; the theory is McLachlan's
+/// of 1995).
+struct Blanes864 {
+  static constexpr int order = 4;
+  static constexpr std::size_t stages = 7;
+
+  template <class S>
+  [[nodiscard]] static constexpr SplittingWeights<S, stages> weights() noexcept {
+    return {detail::symmetric_weights<S, 7>(
+                std::array<std::string_view, 3>{"0.1830836874721972219617037571664302910726",
+                                                "0.3107828598985748695075222910542627963752",
+                                                "-0.02656461851195880069721213791649875926633"}),
+            detail::symmetric_weights<S, 8>(
+                std::array<std::string_view, 3>{"0.0711334264982231177779387300061549964174",
+                                                "0.2411534279566400987364877953262896496178",
+                                                "0.5214117617728147892121360780679942299914"})};
+  }
+};
+
 /// Runge–Kutta–Nyström splitting of order 4 with six kicks: for an exact free motion with kinetic
 /// energy quadratic in the momenta, where {U, {U, {U, T}}} = 0 (Blanes & Moan 2002, SRKN⁶ᵦ).
 struct BlanesMoan4 {

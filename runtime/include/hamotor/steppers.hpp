@@ -59,16 +59,38 @@ template <class Rate, class S>
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
 }
 
+/// Whether a system takes whole steps of a splitting by itself.
+template <class System>
+inline constexpr bool takes_split_steps = false;
+template <class System>
+  requires requires { System::takes_split_steps; }
+inline constexpr bool takes_split_steps<System> = System::takes_split_steps;
+
 /// The scheme of a splitting; a free motion that is exact needs none where nothing acts.
+///
+/// Where nothing acts and for kicks between exact motions there are two exact flows in turn, and
+/// schemes for just that; between motions that are themselves of order 2, only compositions.
 template <class System, int order>
 [[nodiscard]] constexpr auto scheme_of() noexcept {
   static_assert(order == 2 || order == 4 || order == 6 || order == 8 || order == 10);
-  if constexpr (order == 2 || (freely_exact<System> && !System::has_forque)) {
+  constexpr bool free = !System::has_forque && takes_split_steps<System>;
+  constexpr bool exact = freely_exact<System>;
+  if constexpr (order == 2 || (exact && !System::has_forque)) {
     return Composition<Strang>{};
   } else if constexpr (order == 4) {
-    return std::conditional_t<freely_exact<System>, BlanesMoan4, Composition<Suzuki4>>{};
+    if constexpr (free && System::nearly_symmetric) {
+      return Blanes864{};
+    } else if constexpr (free) {
+      return BlanesMoanFree4{};
+    } else {
+      return std::conditional_t<exact, BlanesMoan4, Composition<Suzuki4>>{};
+    }
   } else if constexpr (order == 6) {
-    return std::conditional_t<freely_exact<System>, BlanesMoan6, Composition<KahanLi6>>{};
+    if constexpr (free) {
+      return BlanesMoanFree6{};
+    } else {
+      return std::conditional_t<exact, BlanesMoan6, Composition<KahanLi6>>{};
+    }
   } else if constexpr (order == 8) {
     return Composition<KahanLi8>{};
   } else {
@@ -318,32 +340,45 @@ class Splitting {
   static constexpr std::size_t stages = Scheme::stages;
 
   /// Takes `state` from t to t + h.
-  constexpr void do_step(const System& system, StateOf<System>& state, const S& /*t*/,
-                         const S& h) noexcept {
-    for (std::size_t k = 0; k < stages; ++k) {
-      const S drift = weights.drifts[k] * h;
-      const bool last = k + 1 == stages;
-      if constexpr (System::has_forque) {
-        const S before = k == 0 ? -weights.kicks[0] * h : S(0);
-        const S after = -weights.kicks[k + 1] * h;
-        Momenta kicked = state.momenta;
-        if (opens_with_kick && k == 0) {
-          if (!(known_.at == state.motors && known_.any)) know_forque(system, state.motors);
-          kick(kicked, before);
+  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state,
+                                          const S& /*t*/, const S& h) noexcept {
+    if constexpr (takes_whole_steps) {
+      add(state, system.split_step(state.motors, state.momenta, h, weights));
+    } else {
+      StateOf<System> there = state;
+      ChangeOf<System> change{};
+      const auto moves = [&](const ChangeOf<System>& by) {
+        for (std::size_t i = 0; i < n; ++i) {
+          change.motors[i] = change.motors[i] + by.motors[i];
+          change.momenta[i] = change.momenta[i] + by.momenta[i];
+          there.motors[i] = state.motors[i] + change.motors[i];
+          there.momenta[i] = state.momenta[i] + change.momenta[i];
         }
-        auto change = system.free_change(state.motors, kicked, drift);
-        if (opens_with_kick && k == 0) kick(change.momenta, before);
-        move(state.motors, change.motors, last);
-        if (opens_with_kick || !last) {
-          know_forque(system, state.motors);
-          kick(change.momenta, after);
+      };
+      const auto kick = [&](const S& weight) {
+        for (std::size_t i = 0; i < n; ++i) {
+          change.momenta[i] = mul_add(-weight * h, known_.forque[i], change.momenta[i]);
+          there.momenta[i] = state.momenta[i] + change.momenta[i];
         }
-        push(state.momenta, change.momenta);
-      } else {
-        const auto change = system.free_change(state.motors, state.momenta, drift);
-        move(state.motors, change.motors, last);
-        push(state.momenta, change.momenta);
+      };
+      if constexpr (opens_with_kick) {
+        if (!(known_.at == state.motors && known_.any)) known_.forque = system.forque(state.motors);
+        kick(weights.kicks[0]);
       }
+      for (std::size_t k = 0; k < stages; ++k) {
+        const bool last = k + 1 == stages;
+        moves(system.free_change(there.motors, there.momenta, weights.drifts[k] * h));
+        if constexpr (System::spin_apart) {
+          if (last) moves(system.spin_change(there.motors, there.momenta, h));
+        }
+        if (opens_with_kick || !last) {
+          known_.forque = system.forque(there.motors);
+          kick(weights.kicks[k + 1]);
+        }
+      }
+      add(state, change);
+      known_.any = opens_with_kick;
+      known_.at = state.motors;
     }
   }
 
@@ -362,52 +397,34 @@ class Splitting {
     Momenta momenta{};
   };
   static constexpr bool compensated = summation == Summation::compensated;
+  static constexpr bool takes_whole_steps = detail::takes_split_steps<System>;
   static inline const auto weights = detail::rounded_weights<S, Scheme>();
   static constexpr bool opens_with_kick = detail::rounded_weights<double, Scheme>().kicks[0] > 0;
 
-  constexpr void kick(Momenta& momenta, const S& by) const noexcept {
-    for (std::size_t i = 0; i < n; ++i) {
-      momenta[i] = mul_add(by, known_.forque[i], momenta[i]);
-    }
-  }
-
-  constexpr void know_forque(const System& system, const Motors& motors) noexcept {
-    known_.any = true;
-    known_.at = motors;
-    known_.forque = system.forque(motors);
-  }
-
-  /// Adds what the motors change by; at the end of a step they are put back on the group.
-  constexpr void move(Motors& motors, const Motors& change, bool last) noexcept {
+  /// Adds what a step changes, and puts the motors back on the group.
+  ///
+  /// What was lacking before the step is lacking after it, as (M q)(M q)~ = M M~.  Found before, it
+  /// waits for none of the step's parts and none of the next step's for it.
+  constexpr void add(StateOf<System>& state, const ChangeOf<System>& change) noexcept {
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
-      auto& motor = motors[i];
-      decltype(unit_defect(motor)) defect;
+      auto& motor = state.motors[i];
+      auto& momentum = state.momenta[i];
+      auto defect = unit_defect(motor);
       if constexpr (compensated) {
         auto& low = low_.motors[i];
-        detail::add_compensated(motor, low, change[i]);
-        if (!last) continue;
-        defect = unit_defect(motor) + unit_defect_change(motor, low);
-        detail::add_compensated(motor, low, unit_correction(motor, defect));
+        defect = defect + unit_defect_change(motor, low);
+        const auto correction = unit_correction(motor + change.motors[i], defect);
+        detail::add_compensated(motor, low, change.motors[i] + correction);
+        detail::add_compensated(momentum, low_.momenta[i], change.momenta[i]);
       } else {
-        motor = motor + change[i];
-        if (!last) continue;
-        defect = unit_defect(motor);
+        motor = motor + change.motors[i];
         motor = motor + unit_correction(motor, defect);
+        momentum = momentum + change.momenta[i];
       }
       worst = scalar::max_abs(worst, detail::size(defect));
     }
-    if (last) detail::record(drift_, worst);
-  }
-
-  constexpr void push(Momenta& momenta, const Momenta& change) noexcept {
-    for (std::size_t i = 0; i < n; ++i) {
-      if constexpr (compensated) {
-        detail::add_compensated(momenta[i], low_.momenta[i], change[i]);
-      } else {
-        momenta[i] = momenta[i] + change[i];
-      }
-    }
+    detail::record(drift_, worst);
   }
 
   [[no_unique_address]] std::conditional_t<System::has_forque, KnownForque, Nothing> known_;

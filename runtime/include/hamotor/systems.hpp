@@ -12,240 +12,12 @@
 #include <tuple>
 #include <utility>
 
+#include "hamotor/free_rotation.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/space.hpp"
 #include "hamotor/state.hpp"
 
 namespace hamotor {
-
-/// How the kinetic energy of rotation is cut into exactly solvable parts.
-///
-/// T = |Π|²/2J_c + ½ (1/J_o − 1/J_c) Π_o² + ½ (1/J_i − 1/J_c) Π_i².  The first part
-/// Poisson-commutes with the others (|Π|² is a Casimir of the rotations), so that only two
-/// rotations about axes are left to compose, one for a symmetric body, none for a spherical one.
-struct RotationSplit {
-  int common = 1;  ///< axis c; c, o and i are a permutation of 0, 1, 2
-  int outer = 0;   ///< axis o, turned in two halves
-  int inner = 2;   ///< axis i
-  int axes = 2;    ///< how many of o, i are turned about: 2, 1 (o) or 0
-
-  [[nodiscard]] friend constexpr bool operator==(const RotationSplit&,
-                                                 const RotationSplit&) = default;
-};
-
-/// The cheapest and most accurate split for the given principal moments (kg m²).
-///
-/// The middle moment is the common one, which makes the product of the two remaining coefficients,
-/// and with it the error, least; the larger coefficient goes outside, where the error is halved.
-/// Equal moments are a symmetry and save one or both rotations.
-template <class S>
-[[nodiscard]] constexpr RotationSplit rotation_split(const std::array<S, 3>& moments) noexcept {
-  const S x = moments[0];
-  const S y = moments[1];
-  const S z = moments[2];
-  if (x == y && y == z) return {0, 1, 2, 0};
-  if (x == y) return {0, 2, 1, 1};
-  if (y == z) return {1, 0, 2, 1};
-  if (x == z) return {0, 1, 2, 1};
-  const int middle = (x < y) == (y < z) ? 1 : (y < x) == (x < z) ? 0 : 2;
-  const int a = middle == 0 ? 1 : 0;
-  const int b = middle == 2 ? 1 : 2;
-  const auto weight = [&](int k) {
-    const S c = moments[static_cast<std::size_t>(middle)];
-    const S j = moments[static_cast<std::size_t>(k)];
-    return scalar::abs((c - j) / j);
-  };
-  return weight(a) < weight(b) ? RotationSplit{middle, b, a, 2} : RotationSplit{middle, a, b, 2};
-}
-
-/// In the plane there is one rotation and nothing to choose.
-template <class S>
-[[nodiscard]] constexpr RotationSplit rotation_split(const std::array<S, 1>&) noexcept {
-  return {};
-}
-
-/// Sine of half the angle of a rotation and cosine of half the angle less one, from a quarter of
-/// it.
-template <class S>
-struct HalfAngle {
-  S sine;
-  S cosine_less_one;
-
-  [[nodiscard]] static constexpr HalfAngle of_quarter(const S& quarter) noexcept {
-    const S sine = scalar::sin(quarter);
-    return {S(2) * sine * scalar::cos(quarter), S(-2) * sine * sine};
-  }
-};
-
-namespace detail {
-
-/// Turns momenta and rotors about the axis E_k by −θ and θ: as increments, so that a rounding error
-/// is as small as the angle.
-template <std::size_t K, class S>
-constexpr void turn_about_axis(const HalfAngle<S>& half, std::array<S, 3>& pi,
-                               std::array<S, 3>& change, RotorIncrement<S, 3>& q) noexcept {
-  constexpr std::size_t i = (K + 1) % 3;
-  constexpr std::size_t j = (K + 2) % 3;
-  const S sine = S(2) * mul_add(half.sine, half.cosine_less_one, half.sine);
-  const S cosine_less_one = S(-2) * half.sine * half.sine;
-  const S change_i = mul_add(cosine_less_one, pi[i], sine * pi[j]);
-  const S change_j = mul_add(cosine_less_one, pi[j], -sine * pi[i]);
-  pi[i] = pi[i] + change_i;
-  pi[j] = pi[j] + change_j;
-  change[i] = change[i] + change_i;
-  change[j] = change[j] + change_j;
-
-  const auto [s, v] = q;
-  const S& a = half.cosine_less_one;
-  const S& b = half.sine;
-  q.cosine_less_one = s + mul_add(a, s, mul_add(-b, v[K], a));
-  q.sines[K] = v[K] + mul_add(a, v[K], mul_add(b, s, b));
-  q.sines[i] = v[i] + mul_add(a, v[i], b * v[j]);
-  q.sines[j] = v[j] + mul_add(a, v[j], -b * v[i]);
-}
-
-/// Rᵀ p − p for the rotation R of q.
-template <class S>
-[[nodiscard]] constexpr std::array<S, 3> turned_back_change(const RotorIncrement<S, 3>& q,
-                                                            const std::array<S, 3>& p) noexcept {
-  const auto& v = q.sines;
-  const S x = S(2) * mul_add(p[1], v[2], -p[2] * v[1]);
-  const S y = S(2) * mul_add(p[2], v[0], -p[0] * v[2]);
-  const S z = S(2) * mul_add(p[0], v[1], -p[1] * v[0]);
-  return {x + mul_add(q.cosine_less_one, x, mul_add(y, v[2], -z * v[1])),
-          y + mul_add(q.cosine_less_one, y, mul_add(z, v[0], -x * v[2])),
-          z + mul_add(q.cosine_less_one, z, mul_add(x, v[1], -y * v[0]))};
-}
-
-template <class S>
-[[nodiscard]] constexpr std::array<S, 2> turned_back_change(const RotorIncrement<S, 1>& q,
-                                                            const std::array<S, 2>& p) noexcept {
-  const S& v = q.sines[0];
-  const S x = S(2) * v * p[1];
-  const S y = S(-2) * v * p[0];
-  return {x + mul_add(q.cosine_less_one, x, v * y), y + mul_add(q.cosine_less_one, y, -v * x)};
-}
-
-/// The angular part of a momentum's or rate's components.
-template <std::size_t R, class S, std::size_t D>
-[[nodiscard]] constexpr std::array<S, R> first(const std::array<S, D>& x) noexcept {
-  std::array<S, R> result{};
-  for (std::size_t k = 0; k < R; ++k) result[k] = x[k];
-  return result;
-}
-
-/// What follows the first R components.
-template <std::size_t R, class S, std::size_t D>
-[[nodiscard]] constexpr std::array<S, D - R> rest(const std::array<S, D>& x) noexcept {
-  std::array<S, D - R> result{};
-  for (std::size_t k = R; k < D; ++k) result[k - R] = x[k];
-  return result;
-}
-
-template <class S, std::size_t A, std::size_t B>
-[[nodiscard]] constexpr std::array<S, A + B> joined(const std::array<S, A>& a,
-                                                    const std::array<S, B>& b) noexcept {
-  std::array<S, A + B> result{};
-  for (std::size_t k = 0; k < A; ++k) result[k] = a[k];
-  for (std::size_t k = 0; k < B; ++k) result[A + k] = b[k];
-  return result;
-}
-
-template <class S, std::size_t D>
-[[nodiscard]] constexpr S dot(const std::array<S, D>& a, const std::array<S, D>& b) noexcept {
-  S sum = a[0] * b[0];
-  for (std::size_t k = 1; k < D; ++k) sum = mul_add(a[k], b[k], sum);
-  return sum;
-}
-
-}  // namespace detail
-
-/// Free rotation of a body about its principal frame's origin, R = 3 axes or, in the plane, R = 1.
-template <class S, std::size_t R, RotationSplit split>
-class PrincipalRotation {
- public:
-  using Angular = std::array<S, R>;
-  static constexpr bool is_exact = R == 1 || split.axes < 2;
-
-  /// What a free rotation does: M ↦ M q, and what it adds to Π.
-  struct Change {
-    RotorIncrement<S, R> rotor;
-    Angular angular;
-  };
-
-  constexpr explicit PrincipalRotation(const Angular& moments) noexcept : moments_(moments) {
-    for (std::size_t k = 0; k < R; ++k) inverse_[k] = S(1) / moments[k];
-    if constexpr (R == 3) {
-      const S& c = moments[common];
-      outer_ = (c - moments[outer]) / (c * moments[outer]);
-      inner_ = (c - moments[inner]) / (c * moments[inner]);
-    }
-  }
-
-  /// Principal moments, kg m².
-  [[nodiscard]] constexpr const Angular& moments() const noexcept { return moments_; }
-
-  /// Ω_k = Π_k / J_k, rad/s.
-  [[nodiscard]] constexpr Angular rate(const Angular& pi) const noexcept {
-    Angular w{};
-    for (std::size_t k = 0; k < R; ++k) w[k] = pi[k] * inverse_[k];
-    return w;
-  }
-
-  /// ½ Σ Π_k²/J_k, J.
-  [[nodiscard]] constexpr S energy(const Angular& pi) const noexcept {
-    return S(0.5) * detail::dot(pi, rate(pi));
-  }
-
-  /// The rotation in the time h: exact for a symmetric or spherical body and in the plane,
-  /// otherwise the symmetric composition of order 2 of exact flows that `split` names.
-  ///
-  /// Every rotation is an increment, 1 − cos by the half angle, so that rounding errors shrink with
-  /// the step instead of staying at one unit in the last place of M and Π for every step.
-  [[nodiscard]] constexpr Change free_change(const Angular& pi, const S& h) const noexcept {
-    if constexpr (R == 1) {
-      const auto half = HalfAngle<S>::of_quarter(S(0.25) * h * inverse_[0] * pi[0]);
-      return {{half.cosine_less_one, {half.sine}}, {S(0)}};
-    } else {
-      Change change{about_momentum(pi, S(0.25) * h * inverse_[common]), {}};
-      Angular turned = pi;
-      if constexpr (split.axes == 2) {
-        turn<outer>(S(0.125) * h * outer_, turned, change);
-        turn<inner>(S(0.25) * h * inner_, turned, change);
-        turn<outer>(S(0.125) * h * outer_, turned, change);
-      } else if constexpr (split.axes == 1) {
-        turn<outer>(S(0.25) * h * outer_, turned, change);
-      }
-      return change;
-    }
-  }
-
- private:
-  static constexpr auto common = static_cast<std::size_t>(split.common);
-  static constexpr auto outer = static_cast<std::size_t>(split.outer);
-  static constexpr auto inner = static_cast<std::size_t>(split.inner);
-
-  /// The rotation about Π itself, which leaves Π as it is; `quarter` Π is a quarter of its angle.
-  [[nodiscard]] static constexpr RotorIncrement<S, R> about_momentum(const Angular& pi,
-                                                                     const S& quarter) noexcept {
-    const Angular u{quarter * pi[0], quarter * pi[1], quarter * pi[2]};
-    const S angle = scalar::sqrt(detail::dot(u, u));
-    const auto half = HalfAngle<S>::of_quarter(angle);
-    const S ratio = select(angle > S(0), half.sine / angle, S(2));
-    return {half.cosine_less_one, {ratio * u[0], ratio * u[1], ratio * u[2]}};
-  }
-
-  template <std::size_t K>
-  static constexpr void turn(const S& quarter, Angular& pi, Change& change) noexcept {
-    detail::turn_about_axis<K>(HalfAngle<S>::of_quarter(quarter * pi[K]), pi, change.angular,
-                               change.rotor);
-  }
-
-  Angular moments_;
-  Angular inverse_{};
-  S outer_ = S(0);
-  S inner_ = S(0);
-};
 
 /// What a body's free motion adds to its motor and its momentum.
 template <class G, class S>
@@ -269,6 +41,8 @@ class FreeBody {
   static constexpr std::size_t rotations = Space<G>::rotations;
   static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr std::size_t dimension = Space<G>::dimension;
+  static constexpr bool spin_apart = split.spin_apart;
+  static constexpr bool nearly_symmetric = split.nearly_symmetric;
   static_assert(Space<G>::translates, "a body of a group of rotations is a PivotedBody");
 
   constexpr FreeBody(const S& mass, const std::array<S, rotations>& moments) noexcept
@@ -303,17 +77,29 @@ class FreeBody {
            S(0.5) * inverse_mass_ * detail::dot(p, p);
   }
 
-  /// The free motion in the time h.  Translation (|P|² is a Casimir) and rotation commute, so that
-  /// nothing is lost by splitting them.
+  /// The free motion in the time h, less the spin where that is apart.  Translation (|P|² is a
+  /// Casimir) and rotation commute, so that nothing is lost by splitting them.
   [[nodiscard]] constexpr BodyChange<G, S> free_change(const Element& m, const Momentum& mu,
                                                        const S& h) const noexcept {
-    const auto x = mu.components();
-    const auto rotated = rotation_.free_change(detail::first<rotations>(x), h);
-    const Element moved = Space<G>::translation_change(m, velocity(x, h * inverse_mass_));
-    return {moved + Space<G>::rotation_change(m + moved, rotated.rotor),
-            Momentum::from(detail::joined(
-                rotated.angular,
-                detail::turned_back_change(rotated.rotor, detail::rest<rotations>(x))))};
+    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
+                 rotation_.free_change(detail::first<rotations>(mu.components()), h));
+  }
+
+  /// The spin that is apart, in the time h.
+  [[nodiscard]] constexpr BodyChange<G, S> spin_change(const Element& m, const Momentum& mu,
+                                                       const S& h) const noexcept
+    requires(spin_apart)
+  {
+    return turned(m, mu, rotation_.spin_change(detail::first<rotations>(mu.components()), h));
+  }
+
+  /// All of the free motion in the time h, by a splitting of the rotation.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr BodyChange<G, S> free_step(
+      const Element& m, const Momentum& mu, const S& h,
+      const SplittingWeights<S, stages>& weights) const noexcept {
+    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
+                 rotation_.free_step(detail::first<rotations>(mu.components()), h, weights));
   }
 
   /// Where a point of the principal frame is in the world, m.
@@ -342,6 +128,25 @@ class FreeBody {
   }
 
  private:
+  using Turning = typename PrincipalRotation<S, rotations, split>::Change;
+
+  [[nodiscard]] static constexpr BodyChange<G, S> turned(const Element& m, const Momentum& mu,
+                                                         const Turning& by) noexcept {
+    return {Space<G>::rotation_change(m, by.rotor),
+            Momentum::from(detail::joined(
+                by.angular,
+                detail::turned_back_change(by.rotor, detail::rest<rotations>(mu.components()))))};
+  }
+
+  /// First by d in the body frame, then turned.
+  [[nodiscard]] static constexpr BodyChange<G, S> moved(const Element& m, const Momentum& mu,
+                                                        const std::array<S, dimension>& d,
+                                                        const Turning& by) noexcept {
+    const Element shift = Space<G>::translation_change(m, d);
+    const auto change = turned(m + shift, mu, by);
+    return {shift + change.motor, change.momentum};
+  }
+
   [[nodiscard]] static constexpr std::array<S, dimension> velocity(
       const std::array<S, rotations + dimension>& x, const S& factor) noexcept {
     std::array<S, dimension> v{};
@@ -370,6 +175,8 @@ class PivotedBody {
   static constexpr std::size_t rotations = Space<G>::rotations;
   static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr std::size_t dimension = Space<G>::dimension;
+  static constexpr bool spin_apart = split.spin_apart;
+  static constexpr bool nearly_symmetric = split.nearly_symmetric;
   static_assert(!Space<G>::translates, "a body of a group that translates is a FreeBody");
 
   constexpr PivotedBody(const S& mass, const std::array<S, rotations>& moments,
@@ -404,11 +211,39 @@ class PivotedBody {
     return rotation_.energy(mu.components());
   }
 
-  /// The free motion in the time h.
+  /// The free motion in the time h, less the spin where that is apart.
   [[nodiscard]] constexpr BodyChange<G, S> free_change(const Element& m, const Momentum& mu,
                                                        const S& h) const noexcept {
-    const auto rotated = rotation_.free_change(mu.components(), h);
-    return {Space<G>::rotation_change(m, rotated.rotor), Momentum::from(rotated.angular)};
+    return turned(m, rotation_.free_change(mu.components(), h));
+  }
+
+  /// The spin that is apart, in the time h.
+  [[nodiscard]] constexpr BodyChange<G, S> spin_change(const Element& m, const Momentum& mu,
+                                                       const S& h) const noexcept
+    requires(spin_apart)
+  {
+    return turned(m, rotation_.spin_change(mu.components(), h));
+  }
+
+  /// All of the free motion in the time h, by a splitting of the rotation.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr BodyChange<G, S> free_step(
+      const Element& m, const Momentum& mu, const S& h,
+      const SplittingWeights<S, stages>& weights) const noexcept {
+    return turned(m, rotation_.free_step(mu.components(), h, weights));
+  }
+
+  /// The motion in the field g (world frame, m/s²) in the time h, by a splitting, of a body whose
+  /// centre of mass is on its axis of symmetry.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr BodyChange<G, S> top_step(
+      const Element& m, const Momentum& mu, const Direction& g, const S& h,
+      const SplittingWeights<S, stages>& weights) const noexcept
+    requires(spin_apart)
+  {
+    return turned(
+        m, rotation_.top_step(mu.components(), sandwich(reverse(m), g).components(),
+                              mass_ * center_[static_cast<std::size_t>(split.outer)], h, weights));
   }
 
   /// Where a point of the principal frame is in the world, m.
@@ -438,6 +273,12 @@ class PivotedBody {
   }
 
  private:
+  [[nodiscard]] static constexpr BodyChange<G, S> turned(
+      const Element& m,
+      const typename PrincipalRotation<S, rotations, split>::Change& by) noexcept {
+    return {Space<G>::rotation_change(m, by.rotor), Momentum::from(by.angular)};
+  }
+
   S mass_;
   std::array<S, dimension> center_;
   std::array<S, dimension> pivot_;
@@ -576,6 +417,19 @@ struct SpringBetween {
   }
 };
 
+namespace detail {
+
+/// One body with a fixed point and its centre of mass on its axis of symmetry, in a uniform field
+/// and nothing else.
+template <class Bodies, class Interactions>
+inline constexpr bool is_top = false;
+template <class G, class S, RotationSplit split>
+inline constexpr bool
+    is_top<std::tuple<PivotedBody<G, S, split>>, std::tuple<UniformGravity<G, S>>> =
+        split.spin_apart;
+
+}  // namespace detail
+
 /// Bodies, each in its principal frame, and what acts on them:
 /// H = Σ T_i(μ_i) + Σ U_j(M), and every part of it only if its type is listed.
 template <class Bodies, class Interactions = std::tuple<>>
@@ -591,6 +445,12 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   static constexpr std::size_t bodies = sizeof...(Body);
   static constexpr bool has_forque = sizeof...(Interaction) > 0;
   static constexpr bool free_motion_is_exact = (Body::free_motion_is_exact && ...);
+  static constexpr bool nearly_symmetric =
+      ((Body::free_motion_is_exact || Body::nearly_symmetric) && ...);
+  static constexpr bool spin_apart = has_forque && (Body::spin_apart || ...);
+  /// Whether the system takes whole steps of a splitting by itself.
+  static constexpr bool is_top = detail::is_top<std::tuple<Body...>, std::tuple<Interaction...>>;
+  static constexpr bool takes_split_steps = !has_forque || is_top;
   using Motors = std::array<typename Group::template Element<Scalar>, bodies>;
   using Momenta = std::array<typename Group::template Momentum<Scalar>, bodies>;
   using Rates = std::array<typename Group::template Rate<Scalar>, bodies>;
@@ -666,20 +526,59 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
     return result;
   }
 
-  /// What the free motion, H = T, adds in the time h.
+  /// What the free motion, H = T, adds in the time h, less the spins that are apart.
   [[nodiscard]] constexpr ChangeOf<RigidBodies> free_change(const Motors& motors,
                                                             const Momenta& momenta,
                                                             const Scalar& h) const noexcept {
+    return for_bodies(
+        [&](auto i, const auto& one) { return one.free_change(motors[i], momenta[i], h); });
+  }
+
+  /// What the spins that are apart add in the time h: they commute with H.
+  [[nodiscard]] constexpr ChangeOf<RigidBodies> spin_change(const Motors& motors,
+                                                            const Momenta& momenta,
+                                                            const Scalar& h) const noexcept
+    requires(spin_apart)
+  {
+    return for_bodies([&](auto i, const auto& one) {
+      if constexpr (std::remove_cvref_t<decltype(one)>::spin_apart) {
+        return one.spin_change(motors[i], momenta[i], h);
+      } else {
+        return BodyChange<Group, Scalar>{};
+      }
+    });
+  }
+
+  /// What a whole step of a splitting adds.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr ChangeOf<RigidBodies> split_step(
+      const Motors& motors, const Momenta& momenta, const Scalar& h,
+      const SplittingWeights<Scalar, stages>& weights) const noexcept
+    requires(takes_split_steps)
+  {
+    return for_bodies([&](auto i, const auto& one) {
+      if constexpr (is_top) {
+        return one.top_step(motors[i], momenta[i], std::get<0>(interactions_).acceleration, h,
+                            weights);
+      } else {
+        return one.free_step(motors[i], momenta[i], h, weights);
+      }
+    });
+  }
+
+ private:
+  /// change(std::integral_constant i, body number i) of every body.
+  template <class Change>
+  [[nodiscard]] constexpr ChangeOf<RigidBodies> for_bodies(Change&& change) const noexcept {
     ChangeOf<RigidBodies> result{};
     for_each_body([&](auto i, const auto& one) {
-      const auto change = one.free_change(motors[i], momenta[i], h);
-      result.motors[i] = change.motor;
-      result.momenta[i] = change.momentum;
+      const auto [motor, momentum] = change(i, one);
+      result.motors[i] = motor;
+      result.momenta[i] = momentum;
     });
     return result;
   }
 
- private:
   std::tuple<Body...> bodies_;
   std::tuple<Interaction...> interactions_;
 };

@@ -1,0 +1,463 @@
+// Free rotation of a rigid body about its principal axes, cut into exactly solvable parts.
+//
+// Every rotation is an increment, q − 1 and RᵀΠ − Π, so that rounding errors shrink with the step
+// instead of staying at one unit in the last place of M and Π for every step.
+#pragma once
+
+#include <array>
+#include <concepts>
+#include <cstddef>
+
+#include "hamotor/scalar.hpp"
+#include "hamotor/space.hpp"
+#include "hamotor/splitting_schemes.hpp"
+
+namespace hamotor {
+
+/// How the kinetic energy of rotation is cut into exactly solvable parts.
+///
+/// T = |Π|²/2J_c + ½ (1/J_o − 1/J_c) Π_o² + ½ (1/J_i − 1/J_c) Π_i².  The first part
+/// Poisson-commutes with the others (|Π|² is a Casimir of the rotations), so that only two
+/// rotations about axes are left to compose, one for a symmetric body, none for a spherical one.
+struct RotationSplit {
+  int common = 1;  ///< axis c; c, o and i are a permutation of 0, 1, 2
+  int outer = 0;   ///< axis o, turned in two halves
+  int inner = 2;   ///< axis i
+  int axes = 2;    ///< how many of o, i are turned about: 2, 1 (o) or 0
+  /// Whether the part of axis i is so small that its square hardly counts.
+  bool nearly_symmetric = false;
+  /// Whether the turn about o, of a symmetric body, commutes with what acts on it as well: it is
+  /// then left out of the parts of a step and made once, at its end.
+  bool spin_apart = false;
+
+  [[nodiscard]] friend constexpr bool operator==(const RotationSplit&,
+                                                 const RotationSplit&) = default;
+};
+
+/// The cheapest and most accurate split for the given principal moments (kg m²).
+///
+/// The middle moment is the common one, which makes the product of the two remaining coefficients,
+/// and with it the error, least; the larger coefficient goes outside, where the error is halved.
+/// Equal moments are a symmetry and save one or both rotations.
+template <class S>
+[[nodiscard]] constexpr RotationSplit rotation_split(const std::array<S, 3>& moments) noexcept {
+  const S x = moments[0];
+  const S y = moments[1];
+  const S z = moments[2];
+  if (x == y && y == z) return {.common = 0, .outer = 1, .inner = 2, .axes = 0};
+  if (x == y) return {.common = 0, .outer = 2, .inner = 1, .axes = 1};
+  if (y == z) return {.common = 1, .outer = 0, .inner = 2, .axes = 1};
+  if (x == z) return {.common = 0, .outer = 1, .inner = 2, .axes = 1};
+  const int middle = (x < y) == (y < z) ? 1 : (y < x) == (x < z) ? 0 : 2;
+  const int a = middle == 0 ? 1 : 0;
+  const int b = middle == 2 ? 1 : 2;
+  const auto weight = [&](int k) {
+    const S c = moments[static_cast<std::size_t>(middle)];
+    const S j = moments[static_cast<std::size_t>(k)];
+    return scalar::abs((c - j) / j);
+  };
+  const int outer = weight(a) < weight(b) ? b : a;
+  const int inner = outer == a ? b : a;
+  return {.common = middle,
+          .outer = outer,
+          .inner = inner,
+          .axes = 2,
+          .nearly_symmetric = S(20) * weight(inner) < weight(outer)};
+}
+
+/// In the plane there is one rotation and nothing to choose.
+template <class S>
+[[nodiscard]] constexpr RotationSplit rotation_split(const std::array<S, 1>&) noexcept {
+  return {};
+}
+
+/// The same for a body on which forces act at these points of its principal frame (m) and nowhere
+/// else: on a symmetry axis they leave its spin alone.
+template <class S, std::size_t R, std::size_t D, std::size_t points>
+[[nodiscard]] constexpr RotationSplit rotation_split(
+    const std::array<S, R>& moments,
+    const std::array<std::array<double, D>, points>& where_forces_act) noexcept {
+  RotationSplit split = rotation_split(moments);
+  if (R == 1 || split.axes != 1) return split;
+  split.spin_apart = true;
+  for (const auto& point : where_forces_act) {
+    for (std::size_t k = 0; k < D; ++k) {
+      if (k != static_cast<std::size_t>(split.outer) && point[k] != 0) split.spin_apart = false;
+    }
+  }
+  return split;
+}
+
+namespace detail {
+
+/// (sin x)/x − 1 over z, and (cos x − 1)/z, z = x² ≤ (π/4)²: minimax polynomials, relative errors
+/// of sin x and cos x − 1 below 2.1e-17 before rounding.  Sums in pairs, so that few wait for each
+/// other.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S sine_series(const S& z) noexcept {
+  const S z2 = z * z;
+  const S a = mul_add(S(0x1.1111111110babp-7), z, S(-0x1.5555555555555p-3));
+  const S b = mul_add(S(0x1.71de37946ed6dp-19), z, S(-0x1.a01a019e820aep-13));
+  const S c = mul_add(S(0x1.5e0a4fc16be59p-33), z, S(-0x1.ae6008d114485p-26));
+  return mul_add(z2 * z2, c, mul_add(z2, b, a));
+}
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S cosine_series(const S& z) noexcept {
+  const S z2 = z * z;
+  const S a = mul_add(S(-0x1.6c16c16c16963p-10), z, S(0x1.5555555555555p-5));
+  const S b = mul_add(S(-0x1.27e4fa16cc2d1p-22), z, S(0x1.a01a019f4ddfdp-16));
+  const S c = mul_add(S(-0x1.907cd8ff5ede7p-37), z, S(0x1.1eeb67d026ec6p-29));
+  return mul_add(z, mul_add(z2 * z2, c, mul_add(z2, b, a)), S(-0.5));
+}
+
+/// Whether those polynomials have all digits of S.
+template <class S>
+inline constexpr bool has_series = std::same_as<S, double> || std::same_as<S, float>;
+
+/// (π/4)²
+template <class S>
+inline constexpr S series_bound = S(0x1.3bd3cc9be45dep-1);
+
+}  // namespace detail
+
+/// Sine of half the angle of a rotation and cosine of half the angle less one, both with all digits
+/// however small the angle.
+template <class S>
+struct HalfAngle {
+  S sine;
+  S cosine_less_one;
+
+  [[nodiscard]] HAMOTOR_INLINE static constexpr HalfAngle of(const S& half) noexcept {
+    if constexpr (detail::has_series<S>) {
+      const S z = half * half;
+      if (z <= detail::series_bound<S>) {
+        return {mul_add(half * z, detail::sine_series(z), half), z * detail::cosine_series(z)};
+      }
+    }
+    return of_any(half);
+  }
+
+ private:
+  [[nodiscard]] static constexpr HalfAngle of_any(const S& half) noexcept {
+    if constexpr (std::same_as<S, double> && has_fused_multiply_add) {
+      if (scalar::abs(half) < S(1e8)) return reduced(half);
+    }
+    const S sine = scalar::sin(S(0.5) * half);
+    return {S(2) * sine * scalar::cos(S(0.5) * half), S(-2) * sine * sine};
+  }
+
+  /// By the rest after quarter turns, π/2 in three words (Cody & Waite 1980).
+  [[nodiscard]] static constexpr HalfAngle reduced(const S& half) noexcept {
+    constexpr S to_integer = S(0x1.8p52);
+    const S shifted = mul_add(half, S(0x1.45f306dc9c883p-1), to_integer);
+    const S quarters = shifted - to_integer;
+    const S rest = mul_add(-quarters, S(-0x1.f1976b7ed8fbcp-110),
+                           mul_add(-quarters, S(0x1.1a62633145c07p-54),
+                                   mul_add(-quarters, S(0x1.921fb54442d18p+0), half)));
+    const S z = rest * rest;
+    const S sine = mul_add(rest * z, detail::sine_series(z), rest);
+    const S cosine_less_one = z * detail::cosine_series(z);
+    switch (static_cast<long long>(quarters) & 3) {
+      case 0:
+        return {sine, cosine_less_one};
+      case 1:
+        return {S(1) + cosine_less_one, -sine - S(1)};
+      case 2:
+        return {-sine, -cosine_less_one - S(2)};
+      default:
+        return {-S(1) - cosine_less_one, sine - S(1)};
+    }
+  }
+};
+
+namespace detail {
+
+/// The angular part of a momentum's or rate's components.
+template <std::size_t R, class S, std::size_t D>
+[[nodiscard]] constexpr std::array<S, R> first(const std::array<S, D>& x) noexcept {
+  std::array<S, R> result{};
+  for (std::size_t k = 0; k < R; ++k) result[k] = x[k];
+  return result;
+}
+
+/// What follows the first R components.
+template <std::size_t R, class S, std::size_t D>
+[[nodiscard]] constexpr std::array<S, D - R> rest(const std::array<S, D>& x) noexcept {
+  std::array<S, D - R> result{};
+  for (std::size_t k = R; k < D; ++k) result[k - R] = x[k];
+  return result;
+}
+
+template <class S, std::size_t A, std::size_t B>
+[[nodiscard]] constexpr std::array<S, A + B> joined(const std::array<S, A>& a,
+                                                    const std::array<S, B>& b) noexcept {
+  std::array<S, A + B> result{};
+  for (std::size_t k = 0; k < A; ++k) result[k] = a[k];
+  for (std::size_t k = 0; k < B; ++k) result[A + k] = b[k];
+  return result;
+}
+
+template <class S, std::size_t D>
+[[nodiscard]] constexpr S dot(const std::array<S, D>& a, const std::array<S, D>& b) noexcept {
+  S sum = a[0] * b[0];
+  for (std::size_t k = 1; k < D; ++k) sum = mul_add(a[k], b[k], sum);
+  return sum;
+}
+
+/// What a free rotation does: M ↦ M q, and what it adds to Π.
+template <class S, std::size_t R>
+struct Turning {
+  RotorIncrement<S, R> rotor;
+  std::array<S, R> angular;
+};
+
+/// Turns momenta and rotors about the axis E_k by −θ and θ.
+template <std::size_t K, class S>
+HAMOTOR_INLINE constexpr void turn_about_axis(const HalfAngle<S>& half, std::array<S, 3>& pi,
+                                              Turning<S, 3>& change) noexcept {
+  constexpr std::size_t i = (K + 1) % 3;
+  constexpr std::size_t j = (K + 2) % 3;
+  const S& a = half.cosine_less_one;
+  const S& b = half.sine;
+  const S sine = S(2) * mul_add(b, a, b);
+  const S cosine_less_one = S(-2) * b * b;
+  const S change_i = mul_add(cosine_less_one, pi[i], sine * pi[j]);
+  const S change_j = mul_add(cosine_less_one, pi[j], -sine * pi[i]);
+  pi[i] = pi[i] + change_i;
+  pi[j] = pi[j] + change_j;
+  change.angular[i] = change.angular[i] + change_i;
+  change.angular[j] = change.angular[j] + change_j;
+
+  auto& q = change.rotor;
+  const auto [s, v] = q;
+  q.cosine_less_one = s + mul_add(a, s, mul_add(-b, v[K], a));
+  q.sines[K] = v[K] + mul_add(a, v[K], mul_add(b, s, b));
+  q.sines[i] = v[i] + mul_add(a, v[i], b * v[j]);
+  q.sines[j] = v[j] + mul_add(a, v[j], -b * v[i]);
+}
+
+/// q r − 1.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr RotorIncrement<S, 3> composed(
+    const RotorIncrement<S, 3>& q, const RotorIncrement<S, 3>& r) noexcept {
+  const auto& [s, v] = q;
+  const auto& [a, b] = r;
+  RotorIncrement<S, 3> product{
+      s + (mul_add(a, s, a) - mul_add(v[0], b[0], mul_add(v[1], b[1], v[2] * b[2]))), {}};
+  for (std::size_t k = 0; k < 3; ++k) {
+    const std::size_t i = (k + 1) % 3;
+    const std::size_t j = (k + 2) % 3;
+    product.sines[k] =
+        v[k] + (mul_add(s, b[k], b[k]) + mul_add(a, v[k], mul_add(v[i], b[j], -v[j] * b[i])));
+  }
+  return product;
+}
+
+/// Rᵀ p − p for the rotation R of q.
+template <class S>
+[[nodiscard]] constexpr std::array<S, 3> turned_back_change(const RotorIncrement<S, 3>& q,
+                                                            const std::array<S, 3>& p) noexcept {
+  const auto& v = q.sines;
+  const S x = S(2) * mul_add(p[1], v[2], -p[2] * v[1]);
+  const S y = S(2) * mul_add(p[2], v[0], -p[0] * v[2]);
+  const S z = S(2) * mul_add(p[0], v[1], -p[1] * v[0]);
+  return {x + mul_add(q.cosine_less_one, x, mul_add(y, v[2], -z * v[1])),
+          y + mul_add(q.cosine_less_one, y, mul_add(z, v[0], -x * v[2])),
+          z + mul_add(q.cosine_less_one, z, mul_add(x, v[1], -y * v[0]))};
+}
+
+template <class S>
+[[nodiscard]] constexpr std::array<S, 2> turned_back_change(const RotorIncrement<S, 1>& q,
+                                                            const std::array<S, 2>& p) noexcept {
+  const S& v = q.sines[0];
+  const S x = S(2) * v * p[1];
+  const S y = S(-2) * v * p[0];
+  return {x + mul_add(q.cosine_less_one, x, v * y), y + mul_add(q.cosine_less_one, y, -v * x)};
+}
+
+}  // namespace detail
+
+/// Free rotation of a body about its principal frame's origin, R = 3 axes or, in the plane, R = 1.
+template <class S, std::size_t R, RotationSplit split>
+class PrincipalRotation {
+ public:
+  using Angular = std::array<S, R>;
+  using Change = detail::Turning<S, R>;
+  static constexpr bool is_exact = R == 1 || split.axes < 2;
+
+  constexpr explicit PrincipalRotation(const Angular& moments) noexcept : moments_(moments) {
+    for (std::size_t k = 0; k < R; ++k) inverse_[k] = S(1) / moments[k];
+    if constexpr (R == 3) {
+      const S& c = moments[common];
+      outer_ = (c - moments[outer]) / (c * moments[outer]);
+      inner_ = (c - moments[inner]) / (c * moments[inner]);
+    }
+  }
+
+  /// Principal moments, kg m².
+  [[nodiscard]] constexpr const Angular& moments() const noexcept { return moments_; }
+
+  /// Ω_k = Π_k / J_k, rad/s.
+  [[nodiscard]] constexpr Angular rate(const Angular& pi) const noexcept {
+    Angular w{};
+    for (std::size_t k = 0; k < R; ++k) w[k] = pi[k] * inverse_[k];
+    return w;
+  }
+
+  /// ½ Σ Π_k²/J_k, J.
+  [[nodiscard]] constexpr S energy(const Angular& pi) const noexcept {
+    return S(0.5) * detail::dot(pi, rate(pi));
+  }
+
+  /// The rotation in the time h, less the spin where that is apart: exact for a symmetric or
+  /// spherical body and in the plane, otherwise by Strang's splitting.
+  [[nodiscard]] constexpr Change free_change(const Angular& pi, const S& h) const noexcept {
+    if constexpr (split.spin_apart) {
+      return {spherical_change(pi, h), {}};
+    } else {
+      const SplittingWeights<S, 1> strang{{S(1)}, {S(0.5), S(0.5)}};
+      return free_step(pi, h, strang);
+    }
+  }
+
+  /// All of the rotation in the time h, by a splitting with the turn about o outside and that about
+  /// i inside where it is not exact.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr Change free_step(
+      const Angular& pi, const S& h, const SplittingWeights<S, stages>& weights) const noexcept {
+    if constexpr (R == 1) {
+      const auto half = HalfAngle<S>::of(S(0.5) * h * inverse_[0] * pi[0]);
+      return {{half.cosine_less_one, {half.sine}}, {S(0)}};
+    } else {
+      Change change{spherical_change(pi, h), {}};
+      Angular turned = pi;
+      if constexpr (split.axes == 2) {
+        const S outer_rate = S(0.5) * h * outer_;
+        const S inner_rate = S(0.5) * h * inner_;
+        for (std::size_t k = 0; k < stages; ++k) {
+          turn<outer>(weights.kicks[k] * outer_rate, turned, change);
+          turn<inner>(weights.drifts[k] * inner_rate, turned, change);
+        }
+        turn<outer>(weights.kicks[stages] * outer_rate, turned, change);
+      } else if constexpr (split.axes == 1) {
+        turn<outer>(S(0.5) * h * outer_, turned, change);
+      }
+      return change;
+    }
+  }
+
+  /// The turn about o alone, exact.
+  [[nodiscard]] constexpr Change spin_change(const Angular& pi, const S& h) const noexcept
+    requires(R == 3)
+  {
+    Change change{};
+    Angular turned = pi;
+    turn<outer>(S(0.5) * h * outer_, turned, change);
+    return change;
+  }
+
+  /// q − 1 for the motion of a ball of moments J_c: the rotation about Π itself, which leaves Π as
+  /// it is.
+  [[nodiscard]] constexpr RotorIncrement<S, R> spherical_change(const Angular& pi,
+                                                                const S& h) const noexcept
+    requires(R == 3)
+  {
+    const S factor = S(0.5) * h * inverse_[common];
+    const Angular u{factor * pi[0], factor * pi[1], factor * pi[2]};
+    const auto [ratio, cosine_less_one] = half_about(detail::dot(u, u));
+    return {cosine_less_one, {ratio * u[0], ratio * u[1], ratio * u[2]}};
+  }
+
+  /// A step of a splitting of the symmetric top whose centre of mass is `lever`/m up its axis o, in
+  /// a field that is `field` in the body frame: kicks outside, the motion of a ball inside, and the
+  /// spin once, at the end.  `lever` is kg m, `field` m/s².
+  ///
+  /// The ball turns Rᵀg as well as M, so that neither M nor a sine or a root stands between one
+  /// kick and the next: Rᵀg is carried through the step by itself and only the change of M is
+  /// summed up.  Π·Rᵀg and Π_o are constant.
+  template <std::size_t stages>
+  [[nodiscard]] constexpr Change top_step(const Angular& pi, const Angular& field, const S& lever,
+                                          const S& h,
+                                          const SplittingWeights<S, stages>& w) const noexcept
+    requires(R == 3 && split.axes == 1)
+  {
+    constexpr std::size_t i = (outer + 1) % 3;
+    constexpr std::size_t j = (outer + 2) % 3;
+    Change change{};
+    Angular p = pi;
+    Angular g = field;
+    const S vertical = detail::dot(p, g);
+    const S torque = h * lever;
+    const S half_rate = S(0.5) * h * inverse_[common];
+    const auto kick = [&](const S& weight) {
+      const S by = weight * torque;
+      p[i] = mul_add(-by, g[j], p[i]);
+      p[j] = mul_add(by, g[i], p[j]);
+      change.angular[i] = mul_add(-by, g[j], change.angular[i]);
+      change.angular[j] = mul_add(by, g[i], change.angular[j]);
+    };
+    for (std::size_t k = 0; k < stages; ++k) {
+      kick(w.kicks[k]);
+      const S factor = w.drifts[k] * half_rate;
+      Angular u{};
+      u[outer] = factor * p[outer];
+      u[i] = factor * p[i];
+      u[j] = factor * p[j];
+      const S square = mul_add(u[i], u[i], mul_add(u[j], u[j], u[outer] * u[outer]));
+      const auto [ratio, cosine_less_one] = half_about(square);
+      const S sine = S(2) * mul_add(ratio, cosine_less_one, ratio);
+      const S versine = S(2) * ratio * ratio;
+      const S along = factor * vertical;
+      const Angular before = g;
+      for (std::size_t a = 0; a < 3; ++a) {
+        const std::size_t b = (a + 1) % 3;
+        const std::size_t c = (a + 2) % 3;
+        const S crossed = mul_add(before[b], u[c], -before[c] * u[b]);
+        const S across = mul_add(along, u[a], -square * before[a]);
+        g[a] = mul_add(sine, crossed, mul_add(versine, across, before[a]));
+      }
+      change.rotor = detail::composed(
+          change.rotor,
+          RotorIncrement<S, 3>{cosine_less_one, {ratio * u[0], ratio * u[1], ratio * u[2]}});
+    }
+    kick(w.kicks[stages]);
+    turn<outer>(S(0.5) * h * outer_, p, change);
+    return change;
+  }
+
+ private:
+  static constexpr auto common = static_cast<std::size_t>(split.common);
+  static constexpr auto outer = static_cast<std::size_t>(split.outer);
+  static constexpr auto inner = static_cast<std::size_t>(split.inner);
+
+  struct HalfAbout {
+    S sine_ratio;
+    S cosine_less_one;
+  };
+
+  /// (sin x)/x and cos x − 1 from x²: no root and no quotient where x is small.
+  [[nodiscard]] HAMOTOR_INLINE static constexpr HalfAbout half_about(const S& square) noexcept {
+    if constexpr (detail::has_series<S>) {
+      if (square <= detail::series_bound<S>) {
+        return {mul_add(square, detail::sine_series(square), S(1)),
+                square * detail::cosine_series(square)};
+      }
+    }
+    const S x = scalar::sqrt(square);
+    const auto half = HalfAngle<S>::of(x);
+    return {select(x > S(0), half.sine / x, S(1)), half.cosine_less_one};
+  }
+
+  template <std::size_t K>
+  HAMOTOR_INLINE static constexpr void turn(const S& half_per_momentum, Angular& pi,
+                                            Change& change) noexcept {
+    detail::turn_about_axis<K>(HalfAngle<S>::of(half_per_momentum * pi[K]), pi, change);
+  }
+
+  Angular moments_;
+  Angular inverse_{};
+  S outer_ = S(0);
+  S inner_ = S(0);
+};
+
+}  // namespace hamotor

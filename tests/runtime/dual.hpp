@@ -1,0 +1,49 @@
+// Dual numbers: a value and its derivative with respect to one parameter.
+#pragma once
+
+#include <cmath>
+#include <type_traits>
+
+#include "hamotor/scalar.hpp"
+
+namespace sample {
+
+/// value + slope ε, ε² = 0: a scalar that differentiates what is computed with it, exactly.
+struct Dual {
+  double value = 0;
+  double slope = 0;
+
+  constexpr Dual() = default;
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  constexpr explicit(false) Dual(Number x) : value(static_cast<double>(x)) {}
+  constexpr Dual(double x, double dx) : value(x), slope(dx) {}
+
+  friend constexpr Dual operator-(const Dual& a) { return {-a.value, -a.slope}; }
+  friend constexpr Dual operator+(const Dual& a, const Dual& b) {
+    return {a.value + b.value, a.slope + b.slope};
+  }
+  friend constexpr Dual operator-(const Dual& a, const Dual& b) { return a + -b; }
+  friend constexpr Dual operator*(const Dual& a, const Dual& b) {
+    return {a.value * b.value, a.slope * b.value + a.value * b.slope};
+  }
+  friend constexpr Dual operator/(const Dual& a, const Dual& b) {
+    const double quotient = a.value / b.value;
+    return {quotient, (a.slope - quotient * b.slope) / b.value};
+  }
+  friend constexpr bool operator==(const Dual& a, const Dual& b) = default;
+  friend constexpr bool operator<(const Dual& a, const Dual& b) { return a.value < b.value; }
+  friend constexpr bool operator>(const Dual& a, const Dual& b) { return b < a; }
+};
+
+inline Dual sqrt(const Dual& x) {
+  const double root = std::sqrt(x.value);
+  return {root, 0.5 * x.slope / root};
+}
+inline Dual sin(const Dual& x) { return {std::sin(x.value), std::cos(x.value) * x.slope}; }
+inline Dual cos(const Dual& x) { return {std::cos(x.value), -std::sin(x.value) * x.slope}; }
+inline Dual fma(const Dual& a, const Dual& b, const Dual& c) {
+  return {std::fma(a.value, b.value, c.value), a.slope * b.value + a.value * b.slope + c.slope};
+}
+
+}  // namespace sample
