@@ -100,6 +100,9 @@ class Mpfr {
   friend Mpfr asin(const Mpfr& x) noexcept { return of(mpfr_asin, x); }
   friend Mpfr acos(const Mpfr& x) noexcept { return of(mpfr_acos, x); }
   friend Mpfr atan(const Mpfr& x) noexcept { return of(mpfr_atan, x); }
+  friend Mpfr floor(const Mpfr& x) noexcept {
+    return made([&](mpfr_ptr to) { mpfr_floor(to, static_cast<mpfr_srcptr>(View(x))); });
+  }
   friend Mpfr atan2(const Mpfr& y, const Mpfr& x) noexcept { return of(mpfr_atan2, y, x); }
   friend Mpfr fma(const Mpfr& a, const Mpfr& b, const Mpfr& c) noexcept {
     return of(mpfr_fma, a, b, c);

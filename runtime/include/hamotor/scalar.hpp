@@ -33,6 +33,7 @@ __extension__ __float128 logq(__float128) noexcept;
 __extension__ __float128 asinq(__float128) noexcept;
 __extension__ __float128 acosq(__float128) noexcept;
 __extension__ __float128 atanq(__float128) noexcept;
+__extension__ __float128 floorq(__float128) noexcept;
 __extension__ __float128 atan2q(__float128, __float128) noexcept;
 __extension__ __float128 fmaq(__float128, __float128, __float128) noexcept;
 __extension__ __float128 strtoflt128(const char*, char**) noexcept;
@@ -184,6 +185,7 @@ HAMOTOR_FUNCTION(log)
 HAMOTOR_FUNCTION(asin)
 HAMOTOR_FUNCTION(acos)
 HAMOTOR_FUNCTION(atan)
+HAMOTOR_FUNCTION(floor)
 #undef HAMOTOR_FUNCTION
 
 template <class S>
@@ -223,6 +225,7 @@ inline Float128 log(const Float128& x) noexcept { return logq(x); }
 inline Float128 asin(const Float128& x) noexcept { return asinq(x); }
 inline Float128 acos(const Float128& x) noexcept { return acosq(x); }
 inline Float128 atan(const Float128& x) noexcept { return atanq(x); }
+inline Float128 floor(const Float128& x) noexcept { return floorq(x); }
 inline Float128 atan2(const Float128& y, const Float128& x) noexcept { return atan2q(y, x); }
 inline Float128 fma(const Float128& a, const Float128& b, const Float128& c) noexcept {
   return fmaq(a, b, c);
