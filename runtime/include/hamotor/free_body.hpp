@@ -553,11 +553,13 @@ class FreeRotation {
     // χ at half a period, where the phase is η.
     Wide real_there(1);
     Wide slope_there(0);
-    for (std::size_t n = 0; n < series.phase_terms; ++n) {
+    for (std::size_t n = 0; n <= detail::half_theta_terms<Wide>(); ++n) {
       const Wide weight = detail::power(p, n * n);
       const Wide angle = Wide(2 * n + 1) * eta;
-      series.real[n] = static_cast<S>(weight * scalar::cos(angle));
-      series.imaginary[n] = static_cast<S>(m.side * weight * scalar::sin(angle));
+      if (n < series.phase_terms) {
+        series.real[n] = static_cast<S>(weight * scalar::cos(angle));
+        series.imaginary[n] = static_cast<S>(m.side * weight * scalar::sin(angle));
+      }
       if (n > 0) {
         real_there = real_there + Wide(2) * weight * scalar::cos(Wide(2 * n) * eta);
         slope_there = slope_there + Wide(2 * n) * weight * scalar::sin(Wide(2 * n) * eta);
