@@ -507,11 +507,11 @@ def _scenes() -> list[tuple[str, str]]:
 
 
 def _methods() -> list[tuple[str, str]]:
-    from hamotor.scene import METHODS
+    from hamotor.scene import METHODS, order_in_words
 
     return [
         ("auto", "what suits the scene; run.json says which and why"),
-        *((m.name, f"order {m.order}: {m.description}") for m in METHODS),
+        *((m.name, f"{order_in_words(m.order)}: {m.description}") for m in METHODS),
     ]
 
 

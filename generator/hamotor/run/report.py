@@ -234,11 +234,13 @@ def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
 
 
 def _what(said: Mapping[str, Any]) -> str:
+    from hamotor.scene import order_in_words
+
     matrix = said["representation"] == "matrix"
     form = "matrix form" if matrix else f"{said['kernels']} kernels"
     return (
         f"{said['scene']} · {said['group']} in {said['algebra']} · {said['method']} "
-        f"(order {said['order']}) · {said['scalar']}, {form}"
+        f"({order_in_words(said['order'])}) · {said['scalar']}, {form}"
     )
 
 

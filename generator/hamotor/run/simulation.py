@@ -348,7 +348,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "method": found.time.method,
             "every": found.output.every,
             "spec_hash": found.sha256,
-            "methods": methods_offered(Form.SPLIT if isinstance(found, Scene) else Form.GENERAL),
+            "methods": methods_offered(found.form if isinstance(found, Scene) else Form.GENERAL),
         }
 
     def source(*choice: str) -> str:

@@ -14,6 +14,8 @@ class Form(Flag):
 
     SPLIT = auto()
     """Rigid bodies: kinetic energy, whose motion is known, and a potential."""
+    FREE = auto()
+    """Rigid bodies in which nothing acts; they are split as well."""
     GENERAL = auto()
     """Any H: its whole gradient."""
     MATRIX = auto()
@@ -38,6 +40,7 @@ class Method:
 
     name: str
     order: int
+    """0 where a step is exact but for rounding."""
     description: str
     forms: Form
     promises: Promise = Promise.NOTHING
@@ -46,7 +49,8 @@ class Method:
 
 
 ANY = Form.SPLIT | Form.GENERAL
-ALL = Promise.MOMENTA | Promise.SYMPLECTIC | Promise.SYMMETRIC
+KEPT = Promise.MOMENTA | Promise.SYMMETRIC
+ALL = KEPT | Promise.SYMPLECTIC
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
@@ -65,6 +69,12 @@ METHODS = (
     Method("splitting6", 6, "the same in 9 or 15 parts a step", Form.SPLIT, ALL),
     Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT, ALL),
     Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT, ALL),
+    Method("moser_veselov2", 2, "discrete Moser-Veselov: RATTLE", Form.SPLIT, ALL),
+    Method("moser_veselov4", 4, "the same with modified moments; Poisson", Form.FREE, KEPT),
+    Method("moser_veselov6", 6, "the same, for free bodies only", Form.FREE, KEPT),
+    Method("moser_veselov8", 8, "the same", Form.FREE, KEPT),
+    Method("moser_veselov10", 10, "the same, for the last digits", Form.FREE, KEPT),
+    Method("closed_form", 0, "free bodies at any time, by theta functions", Form.FREE, ALL),
     Method("lie_midpoint", 2, "midpoint rule, symplectic for any H, implicit", ANY, ALL),
     Method("gauss4", 4, "Gauss collocation, the same with 2 stages", ANY, ALL),
     Method("gauss6", 6, "the same with 3 stages", ANY, ALL),
@@ -73,10 +83,15 @@ METHODS = (
         "taylor", 21, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
     ),
 )
-METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & ANY))
+METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & (ANY | Form.FREE)))
 """What a scene may ask for."""
 
 
 def methods_offered(form: Form) -> dict[str, int]:
     """Names and orders of the methods for this form of a scene."""
     return {method.name: method.order for method in METHODS if method.forms & form}
+
+
+def order_in_words(order: int) -> str:
+    """`order 4`, or `exact`."""
+    return f"order {order}" if order else "exact"

@@ -16,6 +16,7 @@ from hamotor.scene.conserved import ConservedQuantity, conserved_quantities
 from hamotor.scene.exact import decimal, rounded
 from hamotor.scene.groups import Group
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
+from hamotor.scene.methods import Form
 from hamotor.scene.motors import Matrix, Vector, cross, motor_of, rotation_matrix
 from hamotor.scene.principal import PrincipalFrame, principal_frame
 
@@ -187,6 +188,12 @@ class Scene:
         fields = [i.acceleration for i in self.interactions if isinstance(i, Gravity)]
         total = tuple(rounded(sum(map(decimal, g), Fraction(0))) for g in zip(*fields, strict=True))
         return total if any(total) else None
+
+    @property
+    def form(self) -> Form:
+        """What kinds of methods step it."""
+        acts = self.gravity is not None or len(self.springs) or self.potential is not None
+        return Form.SPLIT if acts else Form.SPLIT | Form.FREE
 
     @property
     def springs(self) -> tuple[Spring, ...]:

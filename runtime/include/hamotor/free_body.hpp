@@ -666,12 +666,16 @@ class FreeMotion {
   FreeRotation<S, rotations> rotation_;
 };
 
-/// A system of rigid bodies in which nothing acts.
+/// A system of rigid bodies, each in its principal frame.
 template <class System>
-concept FreeSystem = SplitSystem<System> && !System::has_forque && requires(const System& system) {
+concept RigidSystem = SplitSystem<System> && requires(const System& system) {
   system.template body<0>().moments();
   system.template body<0>().mass();
 };
+
+/// A system of rigid bodies in which nothing acts.
+template <class System>
+concept FreeSystem = RigidSystem<System> && !System::has_forque;
 
 /// Free bodies in closed form: every step is evaluated from the state that the first one started
 /// at, so that errors do not add up, whatever the step.  A state changed in between starts anew.

@@ -4,7 +4,9 @@
 #include <tuple>
 
 #include "hamotor/adaptive.hpp"
+#include "hamotor/free_body.hpp"
 #include "hamotor/gauss.hpp"
+#include "hamotor/moser_veselov.hpp"
 #include "hamotor/rkmk.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
@@ -30,6 +32,21 @@ struct Steppers<System> {
 };
 
 template <class System>
+struct RigidSteppers {
+  using type = std::tuple<>;
+};
+template <RigidSystem System>
+struct RigidSteppers<System> {
+  using type = std::tuple<MoserVeselov<System, 2>>;
+};
+template <FreeSystem System>
+struct RigidSteppers<System> {
+  using type =
+      std::tuple<MoserVeselov<System, 2>, MoserVeselov<System, 4>, MoserVeselov<System, 6>,
+                 MoserVeselov<System, 8>, MoserVeselov<System, 10>, ClosedForm<System>>;
+};
+
+template <class System>
 struct SeriesSteppers {
   using type = std::tuple<>;
 };
@@ -43,6 +60,7 @@ struct SeriesSteppers<System> {
 /// The steppers that a system can be stepped with.
 template <class System>
 using SteppersOf = decltype(std::tuple_cat(typename detail::Steppers<System>::type{},
+                                           typename detail::RigidSteppers<System>::type{},
                                            typename detail::SeriesSteppers<System>::type{}));
 
 }  // namespace hamotor

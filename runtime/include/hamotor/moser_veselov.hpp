@@ -231,7 +231,7 @@ class Rotation {
 };
 
 /// A system whose free rotations are these steps, for `Splitting`.
-template <SplitSystem System>
+template <RigidSystem System>
 class FreelyStepped {
  public:
   using Group = typename System::Group;
@@ -314,7 +314,7 @@ class FreelyStepped {
 /// conserves, and the motion of the momenta is a Poisson map, but that of the whole state is not
 /// symplectic. A step that turns a body too far for the equation to have a solution (h Π/2J of
 /// about 1) fails.
-template <SplitSystem System, int nominal_order>
+template <RigidSystem System, int nominal_order>
   requires(nominal_order == 2 || FreeSystem<System>)
 class MoserVeselov {
   using S = typename System::Scalar;
