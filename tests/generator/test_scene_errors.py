@@ -74,7 +74,7 @@ MISTAKES: dict[str, tuple[str, str, str, list[str]]] = {
     "unknown algebra": (TOP, '"pga3"', '"pga5"', ['unknown algebra "pga5"; algebras are "cga2", "cga3", "cl3", "pga2", "pga3", "pga4", "sta".', "Did you mean"]),
     "unknown group": (TOP, PGA3, f'{PGA3}\ngroup = "SE4"', ['unknown group "SE4"; groups of pga3 are "SE3", "SO3", "T3".', "Did you mean"]),
     "group of another algebra": (TOP, PGA3, f'{PGA3}\ngroup = "SE2"', ['unknown group "SE2"; groups of pga3 are "SE3", "SO3", "T3".']),
-    "unknown method": (TOP, "step = 0.01", 'step = 0.01\nmethod = "rkmk"', ['[time]: unknown method "rkmk"; methods are ' + ", ".join(f'"{name}"' for name in METHOD_NAMES) + '. Did you mean "rkmk4"?']),
+    "unknown method": (TOP, "step = 0.01", 'step = 0.01\nmethod = "rkmk"', ['[time]: unknown method "rkmk"; methods are ' + ", ".join(f'"{name}"' for name in METHOD_NAMES[:9]), '. Did you mean "rkmk4"?']),
     "missing algebra": (TOP, PGA3, "", ['missing "algebra"']),
     "missing bodies": ('algebra = "pga3"\n[time]\nend = 1\nstep = 1', "", "", ["at least one [[body]]"]),
     "missing name": (TOP, 'name = "top"', "", ['body 1: missing "name"']),
