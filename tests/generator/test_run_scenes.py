@@ -204,5 +204,5 @@ def test_stages_that_do_not_converge_stop_the_run() -> None:
 
 
 def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:
-    with pytest.raises(hamotor.UsageError, match="this scene offers auto, .*gauss4"):
+    with pytest.raises(hamotor.UsageError, match=r"this scene offers auto, .*gauss4"):
         choose_method("splitting4", methods_offered(Form.GENERAL))
