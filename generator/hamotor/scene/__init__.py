@@ -4,7 +4,14 @@ from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import GROUPS, Group
 from hamotor.scene.interactions import Gravity, Interaction, Spring
-from hamotor.scene.methods import METHOD_NAMES, METHODS, Form, Promise, methods_offered, order_in_words
+from hamotor.scene.methods import (
+    METHOD_NAMES,
+    METHODS,
+    Form,
+    Promise,
+    methods_offered,
+    order_in_words,
+)
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.principal import PrincipalFrame
 from hamotor.scene.reading import bundled_scenes, find_scene, folder_of, parse_scene, read_scene
