@@ -41,9 +41,8 @@ struct RigidSteppers<System> {
 };
 template <FreeSystem System>
 struct RigidSteppers<System> {
-  using type =
-      std::tuple<MoserVeselov<System, 2>, MoserVeselov<System, 4>, MoserVeselov<System, 6>,
-                 MoserVeselov<System, 8>, MoserVeselov<System, 10>, ClosedForm<System>>;
+  using type = std::tuple<MoserVeselov<System, 2>, MoserVeselov<System, 4>, MoserVeselov<System, 6>,
+                          MoserVeselov<System, 8>, MoserVeselov<System, 10>, ClosedForm<System>>;
 };
 
 template <class System>
