@@ -238,6 +238,8 @@ class FreelyStepped {
   using Scalar = typename System::Scalar;
   static constexpr std::size_t bodies = System::bodies;
   static constexpr bool has_forque = System::has_forque;
+  static constexpr bool spin_apart = false;
+  static constexpr bool takes_split_steps = !has_forque;
   using Motors = decltype(StateOf<System>::motors);
   using Momenta = decltype(StateOf<System>::momenta);
   using Rotations = std::array<Rotation<Scalar>, bodies>;
@@ -288,6 +290,17 @@ class FreelyStepped {
       }
     });
     return result;
+  }
+
+  /// Where nothing acts a free motion is the whole step.
+  template <class Weights>
+  [[nodiscard]] constexpr ChangeOf<FreelyStepped> split_step(const Motors& motors,
+                                                             const Momenta& momenta,
+                                                             const Scalar& h,
+                                                             const Weights&) const noexcept
+    requires(takes_split_steps)
+  {
+    return free_change(motors, momenta, h);
   }
 
  private:
