@@ -33,7 +33,7 @@ from hamotor.codegen.program import (
 )
 from hamotor.codegen.taylor import Recurrence, recurrence, steps
 from hamotor.errors import UsageError
-from hamotor.mechanics.flow import WORK, motor_flow
+from hamotor.mechanics.flow import WORK, Flow, flows
 from hamotor.mechanics.proof import moved
 from hamotor.mechanics.states import (
     coadjoint,
@@ -126,8 +126,8 @@ def series_functions() -> dict[str, Callable[..., Any]]:
     return named | {"sqrt": lifted(mpmath.sqrt), "atan2": angle, "number": exact}
 
 
-def expected_coefficients(system: System) -> tuple[dict[str, Any], dict[str, list[Any]]]:
-    """A random state, and the motion's Taylor coefficients there by iterating ẋ = f(x)."""
+def expected_coefficients(system: System) -> dict[str, list[Any]]:
+    """The motion's Taylor coefficients at a random state, by iterating Ṁ = M B, μ̇ = ad*_B μ − F."""
     state = next(random_states(system))
     bodies = system.hamiltonian.bodies
     known = {name: [x] for name, x in state.values.items()} | {WORK: [mpmath.mpf(0)]}
@@ -157,7 +157,26 @@ def expected_coefficients(system: System) -> tuple[dict[str, Any], dict[str, lis
             change |= motor_values(body, k, moved(body, at, k, rate))
         for name, derivative in change.items():
             known[name].append(as_series(derivative, length).terms[length - 1] / length)
-    return {name: c[0] for name, c in known.items()}, known
+    return known
+
+
+def coordinates_of(flow: Flow, motion: Mapping[str, list[Any]]) -> dict[str, list[Any]]:
+    """The coefficients of a flow's coordinates."""
+    given = {name: Series(tuple(c)) for name, c in motion.items()}
+    entered = flow.enter.evaluate(given, series_functions())
+    series = {c: as_series(entered[f"x[{i}]"], ORDER + 1) for i, c in enumerate(flow.coordinates)}
+    if WORK in series:
+        series[WORK] = given[WORK]
+    return {name: list(x.terms) for name, x in series.items()}
+
+
+def expect_way_back(flow: Flow, motion: Mapping[str, list[Any]], start: Mapping[str, Any]) -> None:
+    """Leaving gives the state that was entered; coordinates that follow from others do."""
+    x = {f"x[{i}]": start[name] for i, name in enumerate(flow.coordinates)}
+    for name, value in flow.leave.evaluate(x, plain_functions()).items():
+        assert abs(value - motion[name][0]) <= AGREEMENT * max(1, abs(value)), name
+    for name, value in flow.refresh.evaluate(x, plain_functions()).items():
+        assert abs(value - x[name]) <= AGREEMENT, name
 
 
 def as_series(x: Any, length: int) -> Series:
@@ -208,11 +227,15 @@ def test_coefficients_are_those_of_series_arithmetic(name: str) -> None:
     scene = read_scene(name)
     system = principal_system(scene) if isinstance(scene, Scene) else scene.system
     with mpmath.workdps(DIGITS):
-        start, expected = expected_coefficients(system)
-        series = recurrence(motor_flow(system).field)
-        found = series.coefficients(start, ORDER, plain_functions())
-        expect_equal(found, expected, name)
-        expect_equal(of_emitted_programs(series, start), found, f"{name}, as programs")
+        motion = expected_coefficients(system)
+        for flow in flows(system):
+            expected = coordinates_of(flow, motion)
+            start = {coordinate: c[0] for coordinate, c in expected.items()}
+            series = recurrence(flow.field)
+            found = series.coefficients(start, ORDER, plain_functions())
+            expect_equal(found, expected, name)
+            expect_equal(of_emitted_programs(series, start), found, f"{name}, as programs")
+            expect_way_back(flow, motion, start)
 
 
 def test_every_function_has_its_series() -> None:

@@ -5,16 +5,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 
 import sympy
 
+from hamotor.codegen.algebra import Blade, Rational
 from hamotor.codegen.program import Program
-from hamotor.mechanics.coordinates import Expr
+from hamotor.codegen.taylor import Recurrence, recurrence
+from hamotor.mechanics.body_frame import BodyFrame, Rewriting, Unsuitable
+from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.hamiltonian import TIME, coadjoint
 from hamotor.mechanics.straightline import straight_line
-from hamotor.mechanics.system import Definition, System
+from hamotor.mechanics.system import Definition, System, folded
 
 WORK = "work"
 """The coordinate that is ∫ dH/dt dt."""
@@ -27,6 +31,7 @@ class Flow:
     field: outputs are named like the coordinates, which are all that it reads.
     enter: from `m{k}.NAME`, `mu{k}.NAME` and `t` to `x[i]`, the coordinates in their order.
     leave: from `x[i]` back to `m{k}.NAME` and `mu{k}.NAME`.
+    refresh: from `x[i]` to those `x[i]` that follow from others and stand last.
     parts: which coordinates are compared with each other when an error is said to be small; one
         number for those of a kind, −1 for time and work.
     """
@@ -34,12 +39,29 @@ class Flow:
     field: Program
     enter: Program
     leave: Program
+    refresh: Program
     parts: tuple[int, ...]
+    independent: int
+    """How many coordinates stand before those of `refresh`."""
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """The names of x."""
         return tuple(name for name, _ in self.field.outputs)
+
+
+def cheapest(system: System) -> tuple[Flow, Recurrence]:
+    """The flow whose recurrence has the fewest products, and that recurrence."""
+    pairs = [(flow, recurrence(flow.field)) for flow in flows(system)]
+    return min(pairs, key=lambda pair: len(pair[1].lanes))
+
+
+def flows(system: System) -> list[Flow]:
+    """The coordinates that there are for the motion."""
+    found = [motor_flow(system)]
+    with suppress(Unsuitable):
+        found += [body_flow(system, rows=rows) for rows in (True, False)]
+    return found
 
 
 def motor_flow(system: System) -> Flow:
@@ -79,8 +101,187 @@ def motor_flow(system: System) -> Flow:
         system.of(outputs, definitions),
         straight_line(entered, system.names),
         straight_line(back, {x: f"x[{i}]" for i, x in enumerate(back.values())}),
+        Program((), (), (), None),
         _numbered(kinds),
+        len(outputs),
     )
+
+
+def body_flow(system: System, *, rows: bool) -> Flow:
+    """In rotors, momenta and vectors seen from the bodies; for rigid motions.
+
+    rows: what of R is needed are coordinates of their own; otherwise polynomials of the rotor.
+    Unsuitable for other groups, and where bodies see each other.
+    """
+    h = system.hamiltonian
+    first = [BodyFrame(body, k, _origin(body)) for k, body in enumerate(h.bodies)]
+    energy = folded(h.energy, h.parameters)
+    Rewriting(first)(energy)
+    frames = [
+        BodyFrame(f.body, f.number, f.centers.most_common(1)[0][0])
+        if f.centers and f.body.space.translates
+        else BodyFrame(f.body, f.number, f.origin)
+        for f in first
+    ]
+    rewritten = Rewriting(frames)
+    energy = rewritten(energy)
+    applied = [[rewritten(folded(x, h.parameters)) for x in forque] for forque in h.applied]
+
+    motion: dict[Expr, Expr] = {}
+    places: list[Definition] = [d for frame in frames for d in frame.definitions]
+    rates: list[Definition] = []
+    power = sympy.diff(energy, TIME)
+    kinds: dict[Expr, tuple[int, str, int] | None] = {}
+    for frame in frames:
+        body, k = frame.body, frame.number
+        b = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in body.group.generators)
+        rates += [
+            (s, f"rate{k}_{g.rate}", sympy.diff(energy, p))
+            for s, g, p in zip(b, body.group.generators, body.momenta, strict=True)
+        ]
+        held = [s for s in frame.variations if s in energy.free_symbols]
+        slopes = [(sympy.diff(energy, s), frame.variations[s]) for s in held]
+        turning = coadjoint(body, b)
+        for variable, c in zip(body.motor_variables, body.group.element.components, strict=True):
+            if not _length(c.name):
+                motion[variable.symbol] = _dot(b, variable.variation)
+                kinds[variable.symbol] = k, "motor", 0
+        for i, (momentum, g) in enumerate(zip(body.momenta, body.group.generators, strict=True)):
+            forque = sympy.Add(*(slope * variation[i] for slope, variation in slopes))
+            if applied:
+                forque += applied[k][i]
+                power -= applied[k][i] * b[i]
+            motion[momentum] = turning[i] - forque
+            kinds[momentum] = k, "momentum", _length(g.name)
+        for x in frame.place:
+            if x != 0:
+                motion[x] = _dot(b, frame.variations[x])
+                kinds[x] = k, "place", 1
+    if not h.conservative:
+        motion[TIME], motion[_WORK] = sympy.Integer(1), power
+        kinds[TIME] = kinds[_WORK] = None
+    independent = list(motion)
+    rotations: list[Definition] = [
+        (v.symbol, f"{v.symbol.name.removeprefix(f.body.prefix)}_{f.number}", v.definition)
+        for f in frames
+        for v in f.body.frame_variables
+    ]
+    if rows:
+        used = _needed(motion.values(), [*places, *rates])
+        for frame in frames:
+            b = tuple(s for s, _, _ in rates if s.name.startswith(f"_rate{frame.number}_"))
+            for row in frame.body.rotation:
+                for r in row if used & set(row) else ():
+                    motion[r] = _dot(b, frame.variations[r])
+                    kinds[r] = frame.number, "motor", 0
+    names = _names(system, motion, rotations)
+    indexed = {s: f"x[{i}]" for i, s in enumerate(motion)}
+    definitions = [d for d in [*rotations, *places, *rates] if d[0] not in motion]
+    follows = {indexed[s]: x for s, _, x in rotations if s in motion}
+    return Flow(
+        straight_line({names[s]: x for s, x in motion.items()}, names, definitions),
+        _entering(system, frames, motion, rotations),
+        straight_line(_left(system, frames), indexed),
+        straight_line(follows, indexed),
+        _numbered([kinds[s] for s in motion]),
+        len(independent),
+    )
+
+
+_WORK = sympy.Symbol("_work", real=True)
+
+
+def _origin(body: Coordinates) -> tuple[Expr, ...]:
+    return body.origin if not body.space.translates else (sympy.Integer(0),) * body.dimension
+
+
+def _dot(a: Iterable[Expr], b: Iterable[Expr]) -> Expr:
+    return sympy.Add(*(x * y for x, y in zip(a, b, strict=True)))
+
+
+def _needed(wanted: Iterable[Expr], definitions: list[Definition]) -> set[Expr]:
+    """The symbols that the expressions hold, through definitions."""
+    found = {s for x in wanted for s in x.free_symbols}
+    for symbol, _, x in reversed(definitions):
+        if symbol in found:
+            found |= x.free_symbols
+    return found
+
+
+def _names(system: System, motion: Iterable[Expr], rotations: list[Definition]) -> dict[Expr, str]:
+    rows = {s: name for s, name, _ in rotations}
+
+    def name(s: Expr) -> str:
+        if s is _WORK:
+            return WORK
+        return system.names.get(s) or rows.get(s) or s.name.removeprefix("_")
+
+    return {s: name(s) for s in motion}
+
+
+def _entering(
+    system: System,
+    frames: list[BodyFrame],
+    motion: Iterable[Expr],
+    rotations: list[Definition],
+) -> Program:
+    """The coordinates of a state: X = Rᵀ(x − o)."""
+    seen: dict[Expr, Expr] = {_WORK: sympy.Integer(0)}
+    for frame in frames:
+        if frame.body.space.translates:
+            offset = [x - o for x, o in zip(frame.body.origin, frame.origin, strict=True)]
+            seen |= dict(zip(frame.place, frame.seen(offset), strict=True))
+    outputs = {f"x[{i}]": seen.get(s, s) for i, s in enumerate(motion)}
+    return straight_line(outputs, system.names, rotations)
+
+
+def _left(system: System, frames: list[BodyFrame]) -> dict[str, Expr]:
+    """M = T(o) R T(X), T(v) = 1 + Σ v_i E_i, in the coordinates; and momenta as they are."""
+    outputs: dict[str, Expr] = {}
+    for frame in frames:
+        body = frame.body
+        rotor: dict[Blade, Expr] = {}
+        for symbol, c in zip(body.motor, body.group.element.components, strict=True):
+            if not _length(c.name):
+                for blade, x in c.embedding.items():
+                    rotor[blade] = rotor.get(blade, 0) + symbol * _exact(x)
+        motor = _product(
+            body,
+            _product(body, _translator(body, frame.origin), rotor),
+            _translator(body, frame.place),
+        )
+        for symbol, reading in zip(body.motor, body.group.element.reading, strict=True):
+            outputs[system.names[symbol]] = sympy.Add(
+                *(_exact(x) * motor.get(blade, 0) for blade, x in reading.items())
+            )
+        outputs |= {system.names[p]: p for p in body.momenta}
+    return outputs
+
+
+def _translator(body: Coordinates, v: tuple[Expr, ...]) -> dict[Blade, Expr]:
+    total: dict[Blade, Expr] = {0: sympy.Integer(1)}
+    if not body.space.translates:
+        return total
+    for g, velocity in zip(body.group.generators, body.space.velocities, strict=True):
+        for x, y in zip(v, velocity, strict=True):
+            for blade, z in g.bivector.items():
+                total[blade] = total.get(blade, 0) + x * _exact(y) * _exact(z)
+    return total
+
+
+def _product(
+    body: Coordinates, a: Mapping[Blade, Expr], b: Mapping[Blade, Expr]
+) -> dict[Blade, Expr]:
+    total: dict[Blade, Expr] = {}
+    for left, x in a.items():
+        for right, y in b.items():
+            for blade, z in body.algebra.blade_product(left, right).items():
+                total[blade] = total.get(blade, 0) + _exact(z) * x * y
+    return total
+
+
+def _exact(x: Rational) -> Expr:
+    return sympy.Rational(x.numerator, x.denominator)
 
 
 def _symbol_of(system: System, name: str) -> Expr:

@@ -69,10 +69,10 @@ class System:
         self, outputs: Mapping[str, Expr], between: list[Definition] | None = None
     ) -> Program:
         values = self.hamiltonian.parameters
-        folded = {name: _folded(x, values) for name, x in outputs.items()}
+        known = {name: folded(x, values) for name, x in outputs.items()}
         stages = [*self.places, *(between or [])]
-        definitions = [(s, name, _folded(x, values)) for s, name, x in stages]
-        return straight_line(folded, self.names, definitions)
+        definitions = [(s, name, folded(x, values)) for s, name, x in stages]
+        return straight_line(known, self.names, definitions)
 
     def of(self, outputs: Mapping[str, Expr], between: Sequence[Definition] = ()) -> Program:
         """A program for other functions of the state and the time.
@@ -154,6 +154,7 @@ def _gradient_symbols(body: Coordinates, k: int, n: int, frame: str) -> tuple[Ex
     )
 
 
-def _folded(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
+def folded(expression: Expr, values: Mapping[Expr, Expr]) -> Expr:
+    """The expression with these symbols as numbers."""
     held = {s: x for s, x in values.items() if s in expression.free_symbols}
     return expression.subs(held) if held else expression

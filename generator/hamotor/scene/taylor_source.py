@@ -6,9 +6,9 @@ from typing import Any
 
 from hamotor.codegen import cpp
 from hamotor.codegen.program import Program
-from hamotor.codegen.taylor import NotAnalytic, recurrence, steps
+from hamotor.codegen.taylor import NotAnalytic, steps
 from hamotor.errors import UsageError
-from hamotor.mechanics.flow import WORK, motor_flow
+from hamotor.mechanics.flow import WORK, cheapest
 from hamotor.mechanics.system import System
 from hamotor.scene.source import rendered
 
@@ -33,8 +33,7 @@ def refusal(scene: str, reason: str) -> UsageError:
 
 def recurrence_text(system: System, *, by_name: bool) -> str:
     """The same; NotAnalytic where the motion has no Taylor series everywhere."""
-    flow = motor_flow(system)
-    expansion = recurrence(flow.field)
+    flow, expansion = cheapest(system)
     programs = steps(expansion)
     h = system.hamiltonian
     bodies = []
@@ -57,6 +56,8 @@ def recurrence_text(system: System, *, by_name: bool) -> str:
         bodies=bodies,
         coordinates=len(flow.coordinates),
         parts=flow.parts,
+        independent=flow.independent,
+        refresh=_text(flow.refresh),
         work=flow.coordinates.index(WORK) if WORK in flow.coordinates else None,
         lanes=len(expansion.lanes),
         known=programs.known,

@@ -152,6 +152,8 @@ class Taylor {
       motor = motor + unit_correction(motor, defect);
     }
     Recurrence::replace_motors(x, motors);
+    Recurrence::refresh(x);
+    for (std::size_t i = Recurrence::independent; i < n; ++i) low_[i] = S(0);
     detail::record(drift_, worst);
     expand();
   }
