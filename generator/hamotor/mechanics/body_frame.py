@@ -1,9 +1,9 @@
 """A Hamiltonian in vectors that are seen from the body, where its equations are cheapest.
 
-On groups of rigid motions the place of a body is told by X = Rᵀ(x − o), o a point of the world, and by
-the rows of R, the world's axes seen from the body. All of them move by Ẏ = ξ(a) − Ω × Y, and what
-depends on lengths and angles between points only, as potentials do, is a function of differences of
-them: no rotation stands between a force and the momenta that it changes.
+On groups of rigid motions the place of a body is told by X = Rᵀ(x − o), o a point of the world, and
+by the rows of R, the world's axes seen from the body. All of them move by Ẏ = ξ(a) − Ω × Y, and
+what depends on lengths and angles between points only, as potentials do, is a function of
+differences of them: no rotation stands between a force and the momenta that it changes.
 """
 
 from __future__ import annotations
@@ -253,11 +253,10 @@ class Rewriting:
         frame = v.frame
         if len(frame.axes) != 3 or v is w:
             return None
-        b = [rest.get((j, n), ZERO) for j, n in ((1, 2), (2, 0), (0, 1))]
-        if any(
-            rest.get((n, j), ZERO) != -c
-            for c, (j, n) in zip(b, ((1, 2), (2, 0), (0, 1)), strict=True)
-        ):
+        planes = ((1, 2), (2, 0), (0, 1))
+        b = [rest.get((j, n), ZERO) for j, n in planes]
+        back = [rest.get((n, j), ZERO) for j, n in planes]
+        if any(x != -y for x, y in zip(b, back, strict=True)):
             return None
         seen = sympy.Matrix(frame.seen(b))
         one, other = (sympy.Matrix(self._in_body(x)) for x in (v, w))

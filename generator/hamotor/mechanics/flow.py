@@ -245,11 +245,8 @@ def _left(system: System, frames: list[BodyFrame]) -> dict[str, Expr]:
             if not _length(c.name):
                 for blade, x in c.embedding.items():
                     rotor[blade] = rotor.get(blade, 0) + symbol * _exact(x)
-        motor = _product(
-            body,
-            _product(body, _translator(body, frame.origin), rotor),
-            _translator(body, frame.place),
-        )
+        there, seen = (_translator(body, v) for v in (frame.origin, frame.place))
+        motor = _product(body, _product(body, there, rotor), seen)
         for symbol, reading in zip(body.motor, body.group.element.reading, strict=True):
             outputs[system.names[symbol]] = sympy.Add(
                 *(_exact(x) * motor.get(blade, 0) for blade, x in reading.items())

@@ -80,7 +80,7 @@ METHODS = (
     Method("gauss6", 6, "the same with 3 stages", ANY, ALL),
     Method("gauss8", 8, "the same with 4 stages", ANY, ALL),
     Method(
-        "taylor", 21, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
+        "taylor", 34, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
     ),
 )
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & (ANY | Form.FREE)))
