@@ -18,32 +18,33 @@ inline constexpr int text_digits = 2 + scalar::Limits<S>::digits * 30103 / 10000
 /// The number nearest to the decimal `text`.
 template <class S>
 [[nodiscard]] S number_from(const std::string& text) {
-  if constexpr (std::floating_point<S>) {
-    return static_cast<S>(std::strtold(text.c_str(), nullptr));
+  if constexpr (requires { S::from_text(text); }) {
+    return S::from_text(text);
 #ifdef HAMOTOR_HAS_QUADMATH
   } else if constexpr (std::same_as<S, scalar::Float128>) {
     return strtoflt128(text.c_str(), nullptr);
 #endif
   } else {
-    return S::from_text(text);
+    return static_cast<S>(std::strtold(text.c_str(), nullptr));
   }
 }
 
 /// `x` with `text_digits`.
 template <class S>
 [[nodiscard]] std::string text_of(const S& x) {
-  std::array<char, 64> buffer{};
-  if constexpr (std::floating_point<S>) {
+  if constexpr (requires { x.text(); }) {
+    return x.text();
+  } else {
+    std::array<char, 64> buffer{};
+#ifdef HAMOTOR_HAS_QUADMATH
+    if constexpr (std::same_as<S, scalar::Float128>) {
+      quadmath_snprintf(buffer.data(), buffer.size(), "%.*Qg", text_digits<S>, x);
+      return buffer.data();
+    }
+#endif
     std::snprintf(buffer.data(), buffer.size(), "%.*Lg", text_digits<S>,
                   static_cast<long double>(x));
     return buffer.data();
-#ifdef HAMOTOR_HAS_QUADMATH
-  } else if constexpr (std::same_as<S, scalar::Float128>) {
-    quadmath_snprintf(buffer.data(), buffer.size(), "%.*Qg", text_digits<S>, x);
-    return buffer.data();
-#endif
-  } else {
-    return x.text();
   }
 }
 
