@@ -181,7 +181,9 @@ def _parser() -> _Parser:
         help="install clifford, kingdon, GAlgebra and ganja.js first, to compare kernels with",
     )
     bench = command("bench", "measure speed and error against other libraries", _bench)
-    bench.add_argument("what", metavar="|".join(_BENCHMARKS), nargs="?", default="kernels")
+    bench.add_argument(
+        "what", metavar="|".join(_BENCHMARKS), nargs="?", help="left out: a summary of two minutes"
+    )
     bench.add_argument(
         "scenes", metavar="SCENE", nargs="*", help="which scenes; for stability: which cases"
     )
@@ -191,7 +193,7 @@ def _parser() -> _Parser:
     bench.add_argument(
         "--with-peers",
         action="store_true",
-        help="for precision: install heyoka, SciPy and MuJoCo first, to measure beside",
+        help="install heyoka, SciPy and MuJoCo first, to measure precision beside",
     )
     return parser
 
@@ -559,16 +561,25 @@ def _test(parsed: argparse.Namespace) -> int:
 
 
 def _bench(parsed: argparse.Namespace) -> int:
-    if parsed.what not in _BENCHMARKS:
+    if parsed.what not in (None, *_BENCHMARKS):
         raise UsageError(
             f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)}.'
             f"{suggest(parsed.what, _BENCHMARKS)}"
         )
-    from hamotor.bench import bench_kernels, bench_precision, bench_stability, bench_steps
+    from hamotor.bench import (
+        bench_kernels,
+        bench_precision,
+        bench_stability,
+        bench_steps,
+        bench_summary,
+    )
 
     out = Path(parsed.out) if parsed.out else Path("runs") / "bench"
     if out.exists() and not out.is_dir():
         raise UsageError(f"{out}: is not a folder")
+    if parsed.what is None:
+        bench_summary(out, json=parsed.json, with_peers=parsed.with_peers)
+        return 0
     if parsed.what == "steps":
         bench_steps(parsed.scenes, out, json=parsed.json, quick=parsed.quick)
         return 0

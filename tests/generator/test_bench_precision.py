@@ -18,6 +18,7 @@ from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import Extent, measure
 from hamotor.bench.precision_report import best, table, write_report
 from hamotor.bench.problems import REFERENCES, Problem, own_problems, problem
+from hamotor.bench.summary import summary
 
 
 @pytest.mark.parametrize("name", own_problems())
@@ -107,6 +108,28 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
     assert embedded is not None
     assert json.loads(embedded[1]) == json.loads(json_file.read_text(encoding="utf-8"))
     assert (tmp_path / "precision_planar.svg").is_file()
+
+
+def test_the_summary_says_what_a_kernel_and_a_digit_cost() -> None:
+    kernel = {
+        "mode": "latency", "scalar": "double", "operation": "motor * motor", "compiler": "g++",
+        "max_relative_error": 1e-16,
+    }  # fmt: skip
+    kernels = {
+        "rows": [
+            {**kernel, "contestant": "generated", "ns": 3.0},
+            {**kernel, "contestant": "Eigen quaternion + translation", "ns": 6.0},
+        ]
+    }
+    precision = {
+        "problems": {"p": {"description": "a body", "end_s": 1.0}},
+        "rows": _rows([1e-5, 1e-5, 1e-5], [7, 8, 9]),
+        "not_there": {"heyoka": "not installed"},
+    }
+    text = summary(kernels, precision)
+    assert re.search(r"motor \* motor +3\.0 ns +6\.0 ns +0\.50", text)
+    assert re.search(r"1e-04 rad +7 µs  m ", text)
+    assert "heyoka: not installed" in text
 
 
 def test_the_problems_are_named_as_their_references() -> None:

@@ -17,7 +17,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from datetime import UTC, datetime
 from math import isfinite
 from pathlib import Path
@@ -25,9 +25,9 @@ from typing import Any, Final
 
 from hamotor import __version__
 from hamotor.bench import endpoint
-from hamotor.bench.precision_report import RULES, standings, table, write_report
+from hamotor.bench.precision_report import RULES, leaders, standings, table, write_report
 from hamotor.bench.problems import GOALS, ROOT, TARGETS, Problem, own_problems, problem
-from hamotor.errors import HamotorError, ToolError, UsageError
+from hamotor.errors import HamotorError, ToolError
 from hamotor.run.build import compile_scene, default_cache, eigen, find_compiler, processor_name
 from hamotor.scene import METHODS
 
@@ -121,8 +121,8 @@ def bench_precision(
     """
     gaps: dict[str, str] = {}
     if with_peers:
-        _install()
-    peers = _peers(gaps)
+        install_peers()
+    peers = peers_here(gaps)
     problems = [problem(name) for name in (scenes or own_problems())]
     account = measure(problems, QUICK if quick else FULL, peers, gaps)
     _print(account, as_json=json)
@@ -155,15 +155,22 @@ def measure(
             "goals": list(GOALS.get(one.name, ())),
             "set_up": _set_up(one, extent),
         }
-        for compiler in compilers:
-            _say(f"{one.name}: compiling methods with {compiler}")
-            made, failed = _scenes(one, compiler, extent)
-            contestants += made
-            refused += failed
+        _say(f"{one.name}: compiling methods with {compilers[0]}")
+        made, failed = _scenes(one, compilers[0], extent)
+        contestants += made
+        refused += failed
         if isinstance(one.for_peers, str):
             missing[f"public solvers on {one.name}"] = one.for_peers
         else:
             contestants += _public(one.name, compilers, peers, extent)
+    if len(compilers) > 1:
+        ours = [c for c in contestants if c.family == "hamotor" and not c.form]
+        first = [asdict(row) for row in _times(problems, ours, replace(extent, rounds=0))]
+        for one in problems:
+            leading = leaders(first, one.name)
+            for compiler in compilers[1:]:
+                _say(f"{one.name}: compiling {', '.join(leading)} with {compiler}")
+                contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
     rows = refused + _times(problems, contestants, extent)
     account = {
         "benchmark": "precision",
@@ -215,7 +222,8 @@ def _environment(**changes: str) -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _install() -> None:
+def install_peers() -> None:
+    """Install the public solvers from PyPI into an environment of their own."""
     _say("installing heyoka, SciPy and MuJoCo")
     done = subprocess.run(
         (sys.executable, "-m", "tests.peers.environment", "solvers"), cwd=ROOT, check=False
@@ -234,7 +242,7 @@ def _stopwatch(*arguments: str) -> subprocess.Popen[str]:
     )
 
 
-def _peers(gaps: dict[str, str]) -> dict[str, str]:
+def peers_here(gaps: dict[str, str]) -> dict[str, str]:
     """Versions of the public solvers there are; what is missing goes to `gaps`."""
     with _stopwatch() as answering:
         assert answering.stdout is not None
@@ -245,14 +253,18 @@ def _peers(gaps: dict[str, str]) -> dict[str, str]:
     return {package: version for package, version in versions.items() if version is not None}
 
 
-def _scenes(one: Problem, compiler: str, extent: Extent) -> tuple[list[Contestant], list[Row]]:
-    """Our methods on a problem, compiled; and those that could not be."""
+def _scenes(
+    one: Problem, compiler: str, extent: Extent, only: Sequence[str] | None = None
+) -> tuple[list[Contestant], list[Row]]:
+    """Our methods on a problem, or `only` these, compiled; and those that could not be."""
     simulation = one.simulation
     choices = [("generated", "ga", "double", m) for m in simulation.offered("generated", "ga")]
     if extent.forms:
         for kernels, representation, scalar, methods in _FORMS:
             offered = simulation.offered(kernels, representation)
             choices += [(kernels, representation, scalar, m) for m in methods if m in offered]
+    if only is not None:
+        choices = [choice for choice in choices if choice[-1] in only]
     cache = default_cache() / "precision" / one.name
 
     def compiled(choice: tuple[str, str, str, str]) -> Contestant | Row:
@@ -519,6 +531,3 @@ def _boost_version() -> str:
                 if line.startswith("#define BOOST_LIB_VERSION"):
                     return line.split('"')[1].replace("_", ".")
     return "not there"
-
-
-__all__ = ["UsageError", "bench_precision", "measure"]

@@ -23,7 +23,8 @@ compilation, building a solver) is not in them.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why.
 Public solvers integrate a quaternion and body rates (place and velocity): 7 or 13 numbers. C++ \
-ones are compiled by each compiler with -O3 -march=native, the faster counts. heyoka: compact_mode \
+ones are compiled by each compiler with -O3 -march=native, the faster counts, as do the scenes of \
+the methods that lead. heyoka: compact_mode \
 off, with and without fast_math, its compilation and the time of an empty call taken off. SciPy's \
 rates are plain Python floats, which is faster than NumPy at this size. MuJoCo takes all steps in \
 one call.
@@ -211,6 +212,24 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
         figure.savefig(unfinished, dpi=150, format=file.suffix[1:])
         unfinished.replace(file)
     return files
+
+
+def leaders(rows: Rows, problem: str) -> list[str]:
+    """Our methods that take at most twice the least time to some error, a decade each."""
+    ladders = {
+        ladder[0]["contestant"]: ladder
+        for (of, _), ladder in by_contestant(rows).items()
+        if of == problem and ladder[0]["family"] == "hamotor"
+    }
+    leading: set[str] = set()
+    for decade in range(3, 14):
+        times = {
+            name: min((row["best_us"] for row in meeting(ladder, 10.0**-decade)), default=None)
+            for name, ladder in ladders.items()
+        }
+        least = min((t for t in times.values() if t is not None), default=0.0)
+        leading |= {name for name, t in times.items() if t is not None and t <= 2 * least}
+    return [name for name in ladders if name in leading]
 
 
 def _ahead(ladders: Mapping[str, Rows]) -> list[str]:
