@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 from decimal import Context, Decimal
 from fractions import Fraction
 from pathlib import Path
@@ -18,8 +19,9 @@ import hamotor
 from hamotor.cli import main
 from hamotor.errors import ToolError, UsageError
 from hamotor.run import build
-from hamotor.scene.reading import parse_scene
+from hamotor.scene.reading import bundled_scenes, parse_scene, read_scene
 from hamotor.scene.scalars import NAMES, parse_scalar
+from hamotor.scene.source import scene_source
 
 SCENE = """
 algebra = "pga3"
@@ -192,3 +194,27 @@ def test_an_oracle_is_met_in_25_digits(name: str, tmp_path: Path) -> None:
         wanted = [x for part in physical_digits(group, state) for x in part]
         for a, b in zip(found, wanted, strict=True):
             assert float(abs(a - b)) <= 1e-25 * max(1.0, abs(float(b))), state["t"]
+
+
+@pytest.mark.parametrize("scalar", ["quad", "mpfr"])
+def test_every_method_compiles_in_a_wide_scalar(scalar: str, tmp_path: Path) -> None:
+    source = tmp_path / "scene.cpp"
+    source.write_text(scene_source(read_scene("spring_pendulum"), scalar=scalar))
+    command = [*build.find_compiler(tmp_path).command, "-std=c++20", "-fsyntax-only"]
+    includes = [f"-I{folder}" for folder in build.default_includes()]
+    subprocess.run([*command, *includes, str(source)], check=True)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [name for name, _ in bundled_scenes()])
+def test_bundled_scenes_stay_near_in_float(name: str) -> None:
+    simulation = hamotor.load(name)
+    step = simulation.step or simulation.end / 1000
+    one, other = (
+        simulation.run(scalar=scalar, step=step, end=50 * step) for scalar in ("float", "double")
+    )
+    assert one.report["status"] == "finished"
+    for body in one.bodies:
+        for part in ("motor", "momentum"):
+            a, b = (np.array([*run.final[body][part].values()]) for run in (one, other))
+            assert np.abs(a - b).max() <= 1e-3 * max(1e-3, np.abs(b).max())
