@@ -42,9 +42,11 @@ examples:
   ./hamotor run dzhanibekov
   ./hamotor run tumble --method rkmk4 --step 0.001 --end 100 --every 100
   ./hamotor run spring_pendulum --tolerance 1e-10 --csv --out runs/pendulum
+  ./hamotor run heavy_top --end -5 --at=-1,-2.5,-5
 
-The folder then holds run.json (the account of the run), trajectory/ (Parquet), path.png and
-conserved.png.  An earlier run there is replaced, anything else is left alone.
+The folder then holds run.json (the account of the run), trajectory/ (Parquet), path.png,
+conserved.png and, where events of the scene happened, events.parquet.  An earlier run there is
+replaced, anything else is left alone.
 """
 
 _BENCHMARKS = ("kernels", "steps", "precision", "stability")
@@ -207,10 +209,31 @@ def _add_run(parser: _Parser) -> None:
         "--tolerance",
         metavar="E",
         type=_positive,
-        help="halve the step until the final state changes by at most E",
+        help="an error of the final state of at most E, verified by a second, finer run",
     )
-    parser.add_argument("--end", metavar="T", type=_positive, help="end time, s")
-    parser.add_argument("--every", metavar="N", type=_count, help="record every N-th step")
+    parser.add_argument(
+        "--local-tolerance",
+        metavar="E",
+        type=_positive,
+        help="for methods that choose their steps: error per second; nothing is verified",
+    )
+    parser.add_argument(
+        "--end", metavar="T", type=_finite, help="end time, s; before 0: back in time"
+    )
+    rows = parser.add_mutually_exclusive_group()
+    rows.add_argument("--every", metavar="N", type=_count, help="record every N-th step")
+    rows.add_argument(
+        "--at", metavar="T1,T2,...", type=_times, help="record at these times (s) and no others"
+    )
+    rows.add_argument(
+        "--interval", metavar="T", type=_positive, help="record at the multiples of T, s"
+    )
+    parser.add_argument(
+        "--time-limit",
+        metavar="T",
+        type=_positive,
+        help="integrate for at most T seconds; what was computed is kept (exit 3)",
+    )
     parser.add_argument(
         "--scalar", metavar="S", default="double", help="double|float|long_double|quad|mpfr"
     )
@@ -326,6 +349,10 @@ def _finite(text: str) -> float:
     return number
 
 
+def _times(text: str) -> list[float]:
+    return [_finite(word) for word in text.split(",")]
+
+
 def _count(text: str) -> int:
     try:
         number = int(text)
@@ -349,8 +376,12 @@ def _run(parsed: argparse.Namespace) -> int:
             end=parsed.end,
             step=parsed.step,
             tolerance=parsed.tolerance,
+            local_tolerance=parsed.local_tolerance,
             method=parsed.method,
             every=parsed.every,
+            times=parsed.at,
+            interval=parsed.interval,
+            time_limit=parsed.time_limit,
             scalar=parsed.scalar,
             digits=parsed.digits,
             kernels=parsed.kernels,

@@ -1,4 +1,4 @@
-// A scene small enough to check by hand, speaking version 1 of the compiled scene's C ABI: a body
+// A scene small enough to check by hand, speaking version 2 of the compiled scene's C ABI: a body
 // that spins about e3 at the constant rate l12 while its position x swings as x'' = -x.
 //
 // FAIL_AT n        the state becomes infinite in step n
@@ -112,7 +112,7 @@ EXPORT const char* hamotor_describe() {
   {"name":"spatial_momentum.e12","column":"spatial_momentum.e12",
    "norm":["spatial_momentum.e12"],"scale":1},
   {"name":"spatial_momentum.e02","column":"spatial_momentum.e02",
-   "norm":["spatial_momentum.e02"],"scale":0}]})";
+   "norm":["spatial_momentum.e02"],"scale":0}], "events": []})";
 }
 
 EXPORT void* hamotor_start(const char* method, double time, double step, double,
@@ -147,6 +147,18 @@ EXPORT void hamotor_observe(const void* handle, double* row) {
 EXPORT void* hamotor_start_text(const char*, double, const char*) { return nullptr; }
 
 EXPORT std::int64_t hamotor_observe_text(const void*, char*, std::int64_t) { return 0; }
+
+EXPORT std::int32_t hamotor_observe_at(const void* handle, double time, double* row) {
+  Run run = *static_cast<const Run*>(handle);
+  run.step = time - (run.start + run.step * static_cast<double>(run.index));
+  run.start = time;
+  run.index = 0;
+  advance_one(run);
+  write_row(run, row);
+  return 1;
+}
+
+EXPORT std::int32_t hamotor_observe_event(const void*, std::int64_t, double*) { return 0; }
 
 EXPORT void hamotor_state(const void* handle, double* state) {
   double row[columns];

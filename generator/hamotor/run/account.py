@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 if TYPE_CHECKING:
-    from hamotor.scene import Body, GeneralScene, Scene
+    from hamotor.scene import Body, GeneralScene, Output, Scene
 
 
 def account(scene: Scene | GeneralScene) -> str:
@@ -36,6 +36,7 @@ def _general(scene: GeneralScene) -> str:
     blocks.append(["conserved", *_conserved(scene)])
     blocks.append(["left out", *(f"  {line}" for line in _not_in(scene))])
     blocks.append(["cost of an evaluation", *_cost(scene)])
+    blocks += _events(scene)
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
     return "\n\n".join("\n".join(block) for block in blocks)
 
@@ -92,6 +93,7 @@ def _rigid(scene: Scene) -> str:
         blocks[-1] += [f"  {line}" for line in scene.general.acting]
     blocks.append(["conserved", *_conserved(scene)])
     blocks.append(["left out", *(f"  {line}" for line in _left_out(scene))])
+    blocks += _events(scene)
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
     return "\n\n".join("\n".join(block) for block in blocks)
 
@@ -150,8 +152,34 @@ def _time(scene: Scene | GeneralScene) -> list[str]:
         lines.append(f"step       {time.step:g} s")
     if time.tolerance is not None:
         lines.append(f"tolerance  {time.tolerance:g}")
-    lines += [f"method     {time.method}", f"recorded   every {_ordinal(scene.output.every)} step"]
-    return lines
+    return [*lines, f"method     {time.method}", f"recorded   {_recorded(scene.output)}"]
+
+
+def _recorded(output: Output) -> str:
+    if output.times is not None:
+        shown = ", ".join(f"{t:g}" for t in output.times[:6])
+        return f"at t = {shown}{', …' if len(output.times) > 6 else ''} s"
+    if output.interval is not None:
+        return f"every {output.interval:g} s"
+    return f"every {_ordinal(output.every)} step"
+
+
+def _events(scene: Scene | GeneralScene) -> list[list[str]]:
+    """What is sought on the way, a block if there is any."""
+    if not scene.events:
+        return []
+    width = max(len(event.name) for event in scene.events)
+    how = {"both": "crosses", "rising": "rises through", "falling": "falls through"}
+    return [
+        [
+            "events",
+            *(
+                f"  {event.name.ljust(width)}  {event.text} {how[event.direction]} 0"
+                f"{'; the run ends there' if event.stops else ''}"
+                for event in scene.events
+            ),
+        ]
+    ]
 
 
 def _ordinal(number: int) -> str:

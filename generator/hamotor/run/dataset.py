@@ -15,7 +15,7 @@ import contextlib
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 TRAJECTORY = "trajectory"
 CSV = "trajectory.csv"
+EVENTS = "events.parquet"
+EVENTS_CSV = "events.csv"
 REPORT = "run.json"
 PICTURES = ("path.png", "conserved.png")
 
@@ -111,6 +113,22 @@ class DiskRecorder:
             self._csv.close()
             self._csv = None
 
+    def write_events(self, names: Sequence[str], rows: Rows, *, csv: bool = False) -> None:
+        """Write what happened, if anything did: a name and a row each, in order of time."""
+        if not names:
+            return
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        table = _arrow_table(rows, self._description).add_column(
+            0, pa.field("event", pa.string(), nullable=False), pa.array(names)
+        )
+        pq.write_table(table, self.folder / EVENTS, compression="zstd")
+        if csv:
+            file = _CsvFile(self.folder / EVENTS_CSV, self._description, first=("event",))
+            file.append(table)
+            file.close()
+
     def discard(self) -> None:
         """Delete what was written."""
         self._waiting.clear()
@@ -140,9 +158,10 @@ class DiskRecorder:
 class _CsvFile:
     """RFC 4180: names in the first line, lines end with CR LF, numbers round-trip."""
 
-    def __init__(self, path: Path, description: Description) -> None:
+    def __init__(self, path: Path, description: Description, first: Sequence[str] = ()) -> None:
         self._file = path.open("wb")
-        header = ",".join(_csv_field(column.name) for column in description.columns)
+        names = (*first, *(column.name for column in description.columns))
+        header = ",".join(map(_csv_field, names))
         self._file.write(header.encode() + b"\r\n")
 
     def append(self, table: pa.Table) -> None:
@@ -211,6 +230,19 @@ def read_trajectory(folder: str | os.PathLike[str]) -> dict[str, NDArray[np.floa
     """
     blocks = list(_read_parts(trajectory_parts(Path(folder))))
     return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}
+
+
+def read_events(folder: Path) -> dict[str, NDArray[Any]]:
+    """What happened in a run: `event`, the names, and the trajectory's columns at those times.
+
+    Empty where nothing did.
+    """
+    import pyarrow.parquet as pq
+
+    if not (folder / EVENTS).is_file():
+        return {}
+    table: Any = pq.read_table(folder / EVENTS)
+    return {name: table.column(name).to_numpy() for name in table.column_names}
 
 
 def read_thinned(
@@ -313,10 +345,10 @@ class RunFolder:
         """
         earlier = self._staging / "earlier"
         earlier.mkdir()
-        for name in (REPORT, TRAJECTORY, CSV, *PICTURES):
+        for name in (REPORT, TRAJECTORY, CSV, EVENTS, EVENTS_CSV, *PICTURES):
             if (self.path / name).exists():
                 (self.path / name).rename(earlier / name)
-        for name in (TRAJECTORY, CSV):
+        for name in (TRAJECTORY, CSV, EVENTS, EVENTS_CSV):
             if (recorder.folder / name).exists():
                 (recorder.folder / name).rename(self.path / name)
         unfinished = recorder.folder / REPORT

@@ -68,6 +68,15 @@ class Conserved:
 
 
 @dataclass(frozen=True)
+class Event:
+    """A function of the state whose zeros a run finds; `stops` says whether it ends there."""
+
+    name: str
+    direction: str
+    stops: bool
+
+
+@dataclass(frozen=True)
 class Description:
     """What `hamotor_describe` says about a compiled scene."""
 
@@ -87,6 +96,7 @@ class Description:
     momentum: tuple[str, ...]
     columns: tuple[Column, ...]
     conserved: tuple[Conserved, ...]
+    events: tuple[Event, ...]
 
     @property
     def is_wide(self) -> bool:
@@ -160,6 +170,9 @@ def describe(text: str) -> Description:
                 )
                 for c in said["conserved"]
             ),
+            events=tuple(
+                Event(e["name"], e["direction"], bool(e["stops"])) for e in said["events"]
+            ),
         )
         description.state_columns()
         for quantity in description.conserved:
@@ -202,6 +215,8 @@ class SceneLibrary:
             "hamotor_observe": (None, [run, numbers]),
             "hamotor_start_text": (run, [ctypes.c_char_p, number, ctypes.c_char_p]),
             "hamotor_observe_text": (whole, [run, ctypes.c_char_p, whole]),
+            "hamotor_observe_at": (ctypes.c_int32, [run, number, numbers]),
+            "hamotor_observe_event": (ctypes.c_int32, [run, whole, numbers]),
             "hamotor_state": (None, [run, numbers]),
             "hamotor_drift": (None, [run, numbers]),
             "hamotor_steps": (whole, [run]),
@@ -278,7 +293,8 @@ class LiveRun:
 
         After each step whose index since the start is a multiple of `every`, one row is written
         into `rows`, shape (≥ rows due, columns), C-contiguous float64; None records nothing.
-        Fewer steps than asked for means that a number became non-finite.
+        Fewer steps than asked for means that an event happened in the last of them, or that
+        the next one failed.
         """
         target = None if rows is None else _pointer(rows)
         return int(self._c.hamotor_advance(self._handle, steps, every, target))
@@ -299,6 +315,21 @@ class LiveRun:
         """The same row in all digits of the scalar; None where a number is not finite."""
         numbers = list(map(Decimal, self.observe_text()))
         return tuple(map(Fraction, numbers)) if all(x.is_finite() for x in numbers) else None
+
+    def observe_at(self, time: float) -> Vector | None:
+        """The row at a time (s) within the next step, by a part of it; None where that fails.
+
+        The run stays where it is.
+        """
+        row = np.empty(len(self.description.columns))
+        fine = self._c.hamotor_observe_at(self._handle, time, _pointer(row))
+        return row if fine else None
+
+    def observe_event(self, number: int) -> Vector | None:
+        """The row where this event of the description happened in the last step, if it did."""
+        row = np.empty(len(self.description.columns))
+        happened = self._c.hamotor_observe_event(self._handle, number, _pointer(row))
+        return row if happened else None
 
     def state(self) -> Vector:
         """The state now, shape (state_size,)."""

@@ -21,9 +21,17 @@ from numpy.typing import NDArray
 from hamotor.run.attitude import has_attitude, rotation_matrices
 from hamotor.run.build import CompiledScene
 from hamotor.run.library import Description
-from hamotor.run.runner import Outcome
+from hamotor.run.runner import Breakdown, Outcome
 
-_EXACT = {"final", "conserved"}
+_EXACT = {"final", "conserved", "events"}
+
+TOLERANCE = (
+    "of the final state, verified by a second run with half the step or less, or a sixteenth of "
+    "the local tolerance or less: the largest change of a motor's component, and of a momentum's "
+    "relative to its initial norm"
+)
+_MOST_TIMES = 100
+"""The times of an event that run.json lists; the table of events has all."""
 
 Report = dict[str, Any]
 
@@ -61,8 +69,10 @@ def report(
         "asked_step": plan.asked_step,
         "steps": outcome.steps_done,
         "planned_steps": plan.steps,
-        "every": plan.every,
+        "every": plan.every if plan.times is None else None,
         "rows": outcome.rows,
+        "local_tolerance": plan.tolerance,
+        "own_steps": outcome.own_steps,
         "t_end": float(outcome.final[0]),
         "scalar": description.scalar.replace(" ", "_"),
         "digits": description.digits,
@@ -70,6 +80,8 @@ def report(
         "representation": origin.representation,
         "status": outcome.status,
         "problem": outcome.problem,
+        "failure": None if outcome.breakdown is None else _failure(outcome.breakdown),
+        "events": _events(description, outcome),
         "final": {
             body: final_state(body, description, outcome.final)
             if outcome.wide_final is None
@@ -96,9 +108,11 @@ def report(
         said["tolerance"] = {
             "target": ladder.target,
             "achieved": ladder.achieved,
+            "meaning": TOLERANCE,
             "ladder": [
                 {
                     "step": rung.step,
+                    "local_tolerance": rung.tolerance,
                     "steps": rung.steps,
                     "difference": rung.difference,
                     "status": rung.status,
@@ -123,6 +137,33 @@ def report(
         "fma": description.fma,
     }
     return said
+
+
+def _failure(breakdown: Breakdown) -> dict[str, Any]:
+    """What of a step failed: after which time, with which step (s), and in which column."""
+    return {
+        "reason": breakdown.reason,
+        "t": breakdown.time,
+        "step": breakdown.step,
+        "quantity": breakdown.quantity,
+    }
+
+
+def _events(description: Description, outcome: Outcome) -> dict[str, Any]:
+    """Per event of the scene: how often it happened, when, and whether the run ended there."""
+    times = {
+        event.name: [found.time for found in outcome.events if found.name == event.name]
+        for event in description.events
+    }
+    return {
+        event.name: {
+            "direction": event.direction,
+            "count": len(times[event.name]),
+            "times": times[event.name][:_MOST_TIMES],
+            "stopped": event.stops and bool(times[event.name]),
+        }
+        for event in description.events
+    }
 
 
 def final_state(body: str, description: Description, row: NDArray[Any]) -> dict[str, Any]:
@@ -209,10 +250,10 @@ def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
     ]
     if said["method_reason"]:
         lines.append(f"  {said['method']} because {said['method_reason']}")
-    if said["step"] < said["asked_step"] * (1 - 1e-9):
+    if abs(said["step"]) < abs(said["asked_step"]) * (1 - 1e-9):
         lines.append(
-            f"  the step was shortened from {said['asked_step']:g} s so that a whole number of "
-            "steps ends at the end time"
+            f"  the step was shortened from {abs(said['asked_step']):g} s so that a whole number "
+            "of steps ends at the end time"
         )
     if "tolerance" in said:
         lines.append(f"  {_tolerance(said['tolerance'])}")
@@ -220,6 +261,7 @@ def summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:
         lines.append(
             f"  {said['status']} after {said['steps']:,} of {said['planned_steps']:,} steps"
         )
+    lines += [f"  {line}" for line in _event_lines(said["events"])]
     lines += ["", "  worst relative error of what must stay constant"]
     lines += _conserved_lines(said["conserved"])
     drift = said["drift"]
@@ -247,7 +289,24 @@ def _what(said: Mapping[str, Any]) -> str:
 def _steps(said: Mapping[str, Any]) -> str:
     steps = said["steps"]
     plural = "" if steps == 1 else "s"
-    return f"{steps:,} step{plural} of {said['step']:.6g} s to t = {said['t_end']:.6g} s"
+    end = f"to t = {said['t_end']:.6g} s"
+    if said["local_tolerance"] is not None:
+        chosen = f"{said['own_steps']:,} steps of its own choice"
+        return f"{chosen} for a local error of {said['local_tolerance']:.2g}/s {end}"
+    return f"{steps:,} step{plural} of {said['step']:.6g} s {end}"
+
+
+def _event_lines(events: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    lines = []
+    for name, said in events.items():
+        if not said["count"]:
+            lines.append(f"{name} did not happen")
+            continue
+        when = ", ".join(f"{t:.9g}" for t in said["times"][:3])
+        more = ", …" if said["count"] > 3 else ""
+        stopped = "; the run ended there" if said["stopped"] else ""
+        lines.append(f"{name} happened at t = {when}{more} s ({said['count']}){stopped}")
+    return lines
 
 
 def _rate(timing: Mapping[str, Any]) -> str:
@@ -263,7 +322,10 @@ def _made(timing: Mapping[str, Any]) -> str:
 def _tolerance(said: Mapping[str, Any]) -> str:
     runs = len(said["ladder"])
     achieved = "nothing to compare" if said["achieved"] is None else f"{said['achieved']:.2g}"
-    return f"tolerance {said['target']:g}: the last two of {runs} runs differ by {achieved}"
+    return (
+        f"tolerance {said['target']:g} of the final state: the last two of {runs} runs differ by"
+        f" {achieved}"
+    )
 
 
 def _conserved_lines(conserved: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -281,7 +343,9 @@ def _conserved_lines(conserved: Mapping[str, Mapping[str, Any]]) -> list[str]:
 def _file_lines(folder: Path, said: Mapping[str, Any]) -> list[str]:
     files = ["run.json", f"trajectory/ ({said['rows']:,} rows)"]
     files += [
-        name for name in ("trajectory.csv", "path.png", "conserved.png") if (folder / name).exists()
+        name
+        for name in ("trajectory.csv", "events.parquet", "events.csv", "path.png", "conserved.png")
+        if (folder / name).exists()
     ]
     return [f"  {folder}/", f"    {', '.join(files)}"]
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hamotor.errors import NumericsError, UsageError, suggest
 from hamotor.run.attitude import AXES, has_attitude, rotation_matrices
-from hamotor.run.dataset import REPORT, is_run, read_thinned, read_trajectory, thinned
+from hamotor.run.dataset import REPORT, is_run, read_events, read_thinned, read_trajectory, thinned
 from hamotor.run.library import Description
 from hamotor.run.report import Report, summary
 
@@ -39,11 +39,13 @@ class Run:
         folder: Path | None = None,
         trajectory: Mapping[str, Array] | None = None,
         units: Mapping[str, str] | None = None,
+        events: Mapping[str, NDArray[Any]] | None = None,
     ) -> None:
         self.report = report
         self.folder = folder
         self._trajectory = trajectory
         self._units = units
+        self._events = events
 
     @property
     def trajectory(self) -> Mapping[str, Array]:
@@ -52,6 +54,16 @@ class Run:
             assert self.folder is not None
             self._trajectory = read_trajectory(self.folder)
         return self._trajectory
+
+    @property
+    def events(self) -> Mapping[str, NDArray[Any]]:
+        """What happened: `event`, the events' names, and every column of the trajectory then.
+
+        Shape (n,) each, in order of the run; empty where nothing happened.  Read from disk once.
+        """
+        if self._events is None:
+            self._events = {} if self.folder is None else read_events(self.folder)
+        return self._events
 
     @property
     def units(self) -> Mapping[str, str]:

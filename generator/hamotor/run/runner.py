@@ -11,11 +11,11 @@ import math
 import signal
 import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from types import FrameType, TracebackType
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from hamotor.run.library import (
     Conserved,
     Description,
     Exact,
+    Failure,
     LiveRun,
     Rows,
     SceneLibrary,
@@ -39,13 +40,8 @@ _FIRST_CHUNK_STEPS = 64
 _LARGEST_GROWTH = 8
 _ROWS_PER_CHUNK = 1 << 15
 _MOST_STEPS = 10**15
-_MOST_HALVINGS = 30
-_ROWS_OF_A_TOLERANCE_RUN = 2000
-_TOGETHER = 0.01  # below this difference the runs have begun to converge
-_STALLED_RUNGS = 3
-_PATIENCE = 14
 _VANISHING = 1e-12
-_FIRST_TURN = 0.25  # a first guess turns the motor by at most a quarter of a radian in a step
+_ALIKE = 8 * float(np.finfo(float).eps)
 
 
 class Recorder(Protocol):
@@ -66,7 +62,9 @@ class Plan:
     """How long a run is: `steps` steps of `step` seconds reach `end`; every `every`-th is kept.
 
     `asked_step` is the step asked for: the plan's own is the longest that is not longer and
-    divides the end time into a whole number of steps.
+    divides the end time into a whole number of steps.  Both have the sign of `end`.  `times`, if
+    given, are when rows are kept instead, in order of the run.  `tolerance` is the local error per
+    second of a method that chooses its own steps between those of the plan.
     """
 
     method: str
@@ -75,6 +73,8 @@ class Plan:
     steps: int
     every: int
     asked_step: float
+    times: Vector | None = None
+    tolerance: float | None = None
 
     @property
     def exact_step(self) -> Fraction:
@@ -84,17 +84,34 @@ class Plan:
     @property
     def shortened(self) -> bool:
         """Whether the step had to shrink by more than rounding."""
-        return self.step < self.asked_step * (1 - 1e-9)
+        return abs(self.step) < abs(self.asked_step) * (1 - 1e-9)
+
+    def time(self, index: float | NDArray[np.int64]) -> Any:
+        """When these steps are taken, s: an index times the step, so that no rounding piles up."""
+        return self.step * index
 
 
-def plan(method: str, *, end: float, step: float, every: int) -> Plan:
-    """Fit a whole number of steps into [0, end].
+def plan(
+    method: str,
+    *,
+    end: float,
+    step: float,
+    every: int = 1,
+    times: Sequence[float] | Vector | None = None,
+    tolerance: float | None = None,
+) -> Plan:
+    """Fit a whole number of steps into [0, end]; a negative end is reached back in time.
 
-    Raises UsageError unless end, step (seconds) and every are positive and finite.
+    Raises UsageError unless end (s) is finite and not zero, step (s) finite and of the sign of
+    end or positive, every positive, and times go from 0 to end.
     """
-    for name, value in (("end", end), ("step", step)):
-        if not (math.isfinite(value) and value > 0):
-            raise UsageError(f"{name} must be a positive number of seconds, not {value!r}.")
+    if not (math.isfinite(end) and end != 0):
+        raise UsageError(f"end must be a finite number of seconds and not zero, not {end!r}.")
+    if not (math.isfinite(step) and step != 0 and (step > 0 or end < 0)):
+        raise UsageError(f"step must be a positive number of seconds, not {step!r}.")
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
+        raise UsageError(f"a local tolerance must be a positive number, not {tolerance!r}.")
+    step = math.copysign(step, end)
     if every < 1:
         raise UsageError(f"every must be a whole number of steps, at least 1, not {every}.")
     quotient = end / step
@@ -105,7 +122,21 @@ def plan(method: str, *, end: float, step: float, every: int) -> Plan:
         )
     rounding = max(1e-9, 4 * np.finfo(float).eps * quotient)
     steps = max(1, math.ceil(quotient - rounding))
-    return Plan(method, end, end / steps, steps, every, step)
+    chosen = None if times is None else _checked_times(times, end)
+    return Plan(method, end, end / steps, steps, every, step, chosen, tolerance)
+
+
+def _checked_times(times: Sequence[float] | Vector, end: float) -> Vector:
+    found = np.asarray(times, dtype=np.float64)
+    parts = found / end
+    if found.ndim != 1 or not len(found):
+        raise UsageError("the times to record at must be a list of numbers, s.")
+    for time_, part in zip(found, parts, strict=True):
+        if not 0 <= part <= 1:
+            raise UsageError(f"cannot record at t = {time_:g} s: not between 0 and {end:g} s.")
+    if (np.diff(parts) <= 0).any():
+        raise UsageError("the times to record at must follow each other from 0 to the end.")
+    return found
 
 
 @dataclass(frozen=True)
@@ -131,6 +162,8 @@ class Rung:
     difference: float | None
     status: Status
     integrate_s: float
+    tolerance: float | None = None
+    """Of a method that chooses its steps: its local error per second."""
 
 
 @dataclass(frozen=True)
@@ -143,15 +176,45 @@ class Ladder:
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """A run after its last step.  `final` is the last row; `problem` says why it failed.
+class Happened:
+    """An event that a run found: its name, whether the run ended there, and the row then."""
 
-    `wide_final` is the last row with all digits, where the scalar has more than a double.
+    name: str
+    stops: bool
+    row: Vector
+
+    @property
+    def time(self) -> float:
+        """When, s."""
+        return float(self.row[0])
+
+
+@dataclass(frozen=True)
+class Breakdown:
+    """Why a run could not go on: the time and the step, s, that failed, and what of the state."""
+
+    reason: str
+    """`not_finite`, `no_convergence`, `step_too_short` or `time_limit`."""
+    time: float
+    """The last that was reached, s."""
+    step: float
+    quantity: str
+    """The column that became non-finite; "" where none did, or it is not known."""
+    message: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A run after its last step.  `final` is the last state's row; `problem` says why it failed.
+
+    `wide_final` is that row with all digits, where the scalar has more than a double.
     """
 
     plan: Plan
     status: Status
     steps_done: int
+    own_steps: int
+    """Steps that the method took; more or fewer than `steps_done` where it chooses them."""
     rows: int
     initial: Vector
     final: Vector
@@ -160,8 +223,10 @@ class Outcome:
     total_drift: float
     integrate_s: float
     problem: str = ""
+    breakdown: Breakdown | None = None
     ladder: Ladder | None = None
     wide_final: Exact | None = None
+    events: tuple[Happened, ...] = ()
 
     @property
     def ns_per_step(self) -> float:
@@ -255,81 +320,220 @@ def integrate(
     progress: Progress | None = None,
     interruption: Interruption | None = None,
     stage: str = "",
+    deadline: float = math.inf,
 ) -> Outcome:
-    """Step the scene from t = 0 to the plan's end and record rows.
+    """Step the scene from t = 0 to the plan's end, or to an event that stops it; record rows.
 
     The first row is the initial state, the last the final one, whether or not `every` divides the
-    number of steps.  A number that becomes non-finite ends the run with status "failed": rows up
-    to then are kept.  The recorder is closed.
+    number of steps; where the plan has times, rows are at those alone.  A step that fails ends the
+    run with status "failed", as does `deadline` (of `time.perf_counter`) between two chunks: rows
+    up to then are kept.  The recorder is closed.
     """
     interruption = Interruption() if interruption is None else interruption
     progress = NoProgress() if progress is None else progress
     step = plan.exact_step if library.description.is_wide else plan.step
-    with library.start(plan.method, step=step, state=state) as live:
+    with library.start(plan.method, step=step, state=state, tolerance=plan.tolerance) as live:
         progress.begin(stage, plan.steps)
         try:
-            return _step_in_chunks(live, plan, recorder, progress, interruption)
+            return _Stepping(live, plan, recorder).run(progress, interruption, deadline)
         finally:
             progress.end()
             recorder.close()
 
 
-def _step_in_chunks(
-    live: LiveRun, plan: Plan, recorder: Recorder, progress: Progress, interruption: Interruption
-) -> Outcome:
-    kept = _KeptRows(live, plan, recorder)
-    problem = ""
-    interrupted = False
-    done, chunk = 0, _FIRST_CHUNK_STEPS
-    seconds = 0.0
-    buffer = np.empty((0, len(live.description.columns)))
-    while done < plan.steps and not problem:
-        if interruption.asked:
-            interrupted = True
-            break
-        asked = min(chunk, plan.steps - done, _ROWS_PER_CHUNK * plan.every)
-        if live.description.is_wide:  # every row is the state after a chunk, in all digits
-            asked = min(asked, plan.every - done % plan.every)
-        due = (done + asked) // plan.every - done // plan.every
-        if due > len(buffer):
-            buffer = np.empty((due, len(live.description.columns)))
-        started = time.perf_counter()
-        taken = live.advance(asked, plan.every, buffer if due else None)
-        spent = time.perf_counter() - started
-        seconds += spent
-        rows_at = plan.every * np.arange(
-            done // plan.every + 1, (done + taken) // plan.every + 1, dtype=np.int64
+class _Stepping:
+    """A run from its first step to its last."""
+
+    def __init__(self, live: LiveRun, plan: Plan, recorder: Recorder) -> None:
+        self.live, self.plan = live, plan
+        self.columns = live.description.columns
+        self.kept = _KeptRows(live, plan, recorder)
+        self.due = _Due(plan)
+        self.buffer = np.empty((0, len(self.columns)))
+        self.done = 0
+        self.seconds = 0.0
+        self.breakdown: Breakdown | None = None
+        self.events: list[Happened] = []
+        self.stopped: Happened | None = None
+
+    def run(self, progress: Progress, interruption: Interruption, deadline: float) -> Outcome:
+        """Step to the end, or as far as it goes."""
+        plan, kept = self.plan, self.kept
+        chunk = _FIRST_CHUNK_STEPS
+        interrupted = late = False
+        while self.done < plan.steps and not self.breakdown and not self.stopped:
+            if interruption.asked:
+                interrupted = True
+                break
+            if time.perf_counter() > deadline:
+                late = True
+                break
+            asked = min(chunk, plan.steps - self.done, _ROWS_PER_CHUNK * plan.every)
+            if self.live.description.is_wide and plan.times is None:
+                # Every row is the state after a chunk, in all digits.
+                asked = min(asked, plan.every - self.done % plan.every)
+            self._observe_due()
+            if self.due:
+                asked = min(asked, self.due.index - self.done)
+            spent = self._advance(asked)
+            progress.advance(self.done, self.seconds)
+            chunk = _next_chunk(asked, spent) if spent else chunk
+        if not self.breakdown and not self.stopped:
+            self._observe_due()
+            self.breakdown = kept.flush()
+        if not self.breakdown:
+            last = self.live.observe() if self.stopped is None else self.stopped.row.copy()
+            if self.stopped is None:
+                last[0] = plan.time(self.done)
+            self.breakdown = kept.finish(last, self.done)
+        if late and not self.breakdown:
+            self.breakdown = self._out_of_time()
+        kept.at_least_one_row()
+        largest, total = self.live.drift()
+        failed = self.breakdown is not None
+        return Outcome(
+            plan=plan,
+            status="failed" if failed else "interrupted" if interrupted else "finished",
+            steps_done=kept.step,
+            own_steps=self.live.steps(),
+            rows=kept.rows,
+            initial=kept.initial,
+            final=kept.last,
+            conserved=kept.conserved.errors(kept.last),
+            largest_drift=largest,
+            total_drift=total,
+            integrate_s=self.seconds,
+            problem=self.breakdown.message if self.breakdown else "",
+            breakdown=self.breakdown,
+            wide_final=kept.exact_last,
+            events=tuple(self.events),
         )
-        problem = kept.keep(buffer[: len(rows_at)], rows_at)
-        done += taken
-        if taken < asked and not problem:
-            kept.keep(live.observe()[np.newaxis], np.array([done]))
-            problem = _failure(live, plan, done, kept.initial)
-        progress.advance(done, seconds)
-        chunk = _next_chunk(asked, spent)
-    if kept.step < done and not problem:
-        problem = kept.keep(live.observe()[np.newaxis], np.array([done]))
-    largest, total = live.drift()
-    return Outcome(
-        plan=plan,
-        status="failed" if problem else "interrupted" if interrupted else "finished",
-        steps_done=kept.step,
-        rows=kept.rows,
-        initial=kept.initial,
-        final=kept.last,
-        conserved=kept.conserved.errors(kept.last),
-        largest_drift=largest,
-        total_drift=total,
-        integrate_s=seconds,
-        problem=problem,
-        wide_final=kept.exact_last,
-    )
+
+    def _advance(self, asked: int) -> float:
+        """Take up to `asked` steps and keep what they give; the seconds they took."""
+        plan, kept, live, first = self.plan, self.kept, self.live, self.done
+        every = plan.every if plan.times is None else 0
+        expected = (first + asked) // every - first // every if every else 0
+        if expected > len(self.buffer):
+            self.buffer = np.empty((expected, len(self.columns)))
+        started = time.perf_counter()
+        taken = live.advance(asked, every, self.buffer if expected else None)
+        spent = time.perf_counter() - started
+        self.seconds += spent
+        self.done += taken
+        if taken:
+            self._see_events()
+        beyond = self.done - (self.stopped is not None)  # a stop comes before the end of its step
+        self.breakdown = kept.flush(self.stopped)
+        if every and not self.breakdown:
+            numbers = np.arange(first // every + 1, beyond // every + 1, dtype=np.int64)
+            self.breakdown = kept.keep(self.buffer[: len(numbers)], every * numbers)
+        reason, component = live.failure()
+        if reason is not Failure.NONE and not self.breakdown:
+            kept.stop_at(live.observe(), self.done)
+            self.breakdown = self._failure(reason, component)
+        return spent
+
+    def _see_events(self) -> None:
+        found = [
+            Happened(event.name, event.stops, row)
+            for k, event in enumerate(self.live.description.events)
+            if (row := self.live.observe_event(k)) is not None
+        ]
+        for happened in sorted(found, key=lambda event: event.time / self.plan.end):
+            self.events.append(happened)
+            if happened.stops:
+                self.stopped = happened
+                return
+
+    def _observe_due(self) -> None:
+        """Rows at the times asked for in the step that comes next."""
+        while self.due and self.due.index <= self.done:
+            moment = self.due.pop()
+            if abs(moment - self.plan.time(self.done)) <= _ALIKE * abs(moment):
+                row: Vector | None = self.live.observe()
+            else:
+                row = self.live.observe_at(moment)
+            if row is None:
+                return  # the step itself will say why
+            row[0] = moment
+            self.kept.waiting.append(row)
+
+    def _out_of_time(self) -> Breakdown:
+        at = self.plan.time(self.done)
+        return Breakdown(
+            "time_limit",
+            at,
+            self.plan.step,
+            "",
+            f"the time limit passed after step {self.done:,} of {self.plan.steps:,} "
+            f"(t = {at:.6g} s); what was computed until then is kept.",
+        )
+
+    def _failure(self, reason: Failure, component: int | None) -> Breakdown:
+        """What of the next step failed, and what in the last good state had grown the most."""
+        plan, description = self.plan, self.live.description
+        columns = description.state_columns()
+        at = plan.time(self.done)
+        name = "" if component is None else description.columns[columns[component]].name
+        where = f"in step {self.done + 1}, after t = {at:.6g} s, with a step of {plan.step:.6g} s"
+        if reason is Failure.NO_CONVERGENCE:
+            what = f"the iteration of {plan.method} did not converge {where}."
+            name = ""
+        elif reason is Failure.STEP_TOO_SHORT:
+            what = (
+                f"{plan.method} would need steps shorter than rounding {where}: a local error of "
+                f"{plan.tolerance or 0:.2g} per second is out of reach there."
+            )
+            name = ""
+        elif reason is Failure.LEFT_GROUP:
+            what = f"a motor left the group {where}: |M M~ − 1| was too large to project."
+            name = ""
+        else:
+            what = f"{name or 'the state'} became non-finite {where}."
+        now = self.live.state()
+        growth = np.abs(now) / np.maximum(np.abs(self.kept.initial[columns]), 1.0)
+        worst = int(np.argmax(growth))
+        grown = description.columns[columns[worst]].name
+        return Breakdown(
+            reason.name.lower(),
+            at,
+            plan.step,
+            name,
+            f"{what} In the last finite state {grown} = {now[worst]:.6g} had grown the most. "
+            f"{_advice(plan)}",
+        )
+
+
+class _Due:
+    """The times asked for that are still to come; `index` is the step before the next."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._times = np.empty(0) if plan.times is None else plan.times
+        quotients = self._times / plan.step
+        nearest = np.rint(quotients)
+        alike = np.abs(quotients - nearest) <= _ALIKE * np.maximum(np.abs(quotients), 1.0)
+        self._indices = np.where(alike, nearest, np.floor(quotients)).astype(np.int64)
+        self._next = 0
+
+    def __bool__(self) -> bool:
+        return self._next < len(self._times)
+
+    @property
+    def index(self) -> int:
+        """How many steps are to be taken before the next time is due."""
+        return int(self._indices[self._next])
+
+    def pop(self) -> float:
+        """The next time, s."""
+        self._next += 1
+        return float(self._times[self._next - 1])
 
 
 class _KeptRows:
-    """The rows recorded so far: `step` is the index of the last one, `last` the row itself.
+    """The rows recorded so far: `step` is the index of the last state seen, `last` its row.
 
-    `exact_last` is the same in all digits of a wide scalar, whose rows come one by one.
+    `exact_last` is the same in all digits of a wide scalar.
     """
 
     def __init__(self, live: LiveRun, plan: Plan, recorder: Recorder) -> None:
@@ -342,222 +546,105 @@ class _KeptRows:
         self.exact_last: Exact | None = None
         self.conserved = _ConservedWatch(live.description, initial)
         self.step = self.rows = 0
-        if self.keep(initial[np.newaxis], np.zeros(1, dtype=np.int64)):
+        self.waiting: list[Vector] = []
+        """Rows inside the step that is being taken."""
+        if not np.isfinite(initial).all():
             name = self._columns[int(np.argmin(np.isfinite(initial)))].name
             raise NumericsError(f"{name} is not finite in the initial state.")
+        if plan.times is None:
+            self.keep(initial[np.newaxis], np.zeros(1, dtype=np.int64))
+        elif live.description.is_wide:
+            self._see(initial[np.newaxis], record=False)
 
-    def keep(self, rows: Rows, steps: NDArray[np.int64]) -> str:
+    def keep(self, rows: Rows, steps: NDArray[np.int64]) -> Breakdown | None:
         """Keep the rows after these steps, up to the first that is not finite; say what is not."""
         if not len(rows) or (self.rows and steps[0] <= self.step):
-            return ""
-        # A row's time is its index times the step, so that rounding does not pile up.
-        rows[:, 0] = self._plan.step * steps
-        finite = np.isfinite(rows)
-        good = len(rows) if finite.all() else int(np.argmin(finite.all(axis=1)))
+            return None
+        rows[:, 0] = self._plan.time(steps)
+        good = self._good(rows)
+        breakdown = (
+            self._not_finite(rows[good], f"step {steps[good]}") if good < len(rows) else None
+        )
         if good:
-            exact = self._live.observe_exactly() if self._live.description.is_wide else None
-            if exact is None:
-                self.conserved.see(rows[:good])
-            else:
-                self.conserved.see_exactly(exact)
-                self.exact_last = exact
-            self._recorder.append(rows[:good])
-            self.rows += good
+            self._see(rows[:good], record=self._plan.times is None)
             self.step = int(steps[good - 1])
-            self.last = rows[good - 1].copy()
-        if good == len(rows):
-            return ""
-        name = self._columns[int(np.argmin(finite[good]))].name
-        return (
-            f"{name} became non-finite between step {self.step} and step {steps[good]} "
-            f"(t = {steps[good] * self._plan.step:.6g} s). {_advice(self._plan)}"
+        return breakdown
+
+    def flush(self, stop: Happened | None = None) -> Breakdown | None:
+        """Keep the rows that wait, up to an event that stops the run."""
+        rows = self.waiting
+        if stop is not None:
+            rows = [row for row in rows if row[0] / stop.time <= 1]
+        self.waiting = []
+        if not rows:
+            return None
+        block = np.stack(rows)
+        good = self._good(block)
+        if good:
+            self._see(block[:good], record=True, now=False)
+        return self._not_finite(block[good], "the next step") if good < len(block) else None
+
+    def finish(self, row: Vector, step: int) -> Breakdown | None:
+        """See the final state; it has a row unless it has one already, or rows are at times."""
+        if step == self.step and row[0] == self.last[0]:
+            return None
+        if not self._good(row[np.newaxis]):
+            return self._not_finite(row, f"step {step}")
+        now = row[0] == self._plan.time(step)
+        self._see(row[np.newaxis], record=self._plan.times is None, now=now)
+        self.step = step
+        return None
+
+    def stop_at(self, row: Vector, step: int) -> None:
+        """See the last good state; where rows are at times, one inside the next step is later."""
+        if self._plan.times is None or not self.rows:
+            self.keep(row[np.newaxis], np.array([step]))
+        self.step = step
+
+    def at_least_one_row(self) -> None:
+        """A trajectory without rows would be none: where no time was reached, the last state."""
+        if not self.rows:
+            self._recorder.append(self.last[np.newaxis])
+            self.rows += 1
+
+    def _see(self, rows: Rows, *, record: bool, now: bool = True) -> None:
+        """`now`: the last row is the state now, which a wide scalar has in more digits."""
+        self.last = rows[-1].copy()
+        if not self._live.description.is_wide:
+            self.conserved.see(rows)
+        elif not now:
+            self.exact_last = tuple(map(Fraction, self.last.tolist()))
+        elif (exact := self._live.observe_exactly()) is not None:
+            self.conserved.see_exactly(exact)
+            self.exact_last = exact
+        if record:
+            self._recorder.append(rows)
+            self.rows += len(rows)
+
+    @staticmethod
+    def _good(rows: Rows) -> int:
+        """How many rows come before the first that is not finite."""
+        finite = np.isfinite(rows).all(axis=1)
+        return len(rows) if finite.all() else int(np.argmin(finite))
+
+    def _not_finite(self, row: Vector, where: str) -> Breakdown:
+        name = self._columns[int(np.argmin(np.isfinite(row)))].name
+        return Breakdown(
+            "not_finite",
+            self._plan.time(self.step),
+            self._plan.step,
+            name,
+            f"{name} became non-finite between step {self.step} and {where} "
+            f"(t = {row[0]:.6g} s). {_advice(self._plan)}",
         )
 
 
 def _next_chunk(asked: int, spent: float) -> int:
-    if spent <= 0:
-        return asked * _LARGEST_GROWTH
     fitting = asked * _CHUNK_S / spent
     return max(1, int(min(fitting, asked * _LARGEST_GROWTH)))
 
 
-def _failure(live: LiveRun, plan: Plan, done: int, initial: Vector) -> str:
-    """Which part of the state left the finite numbers: the one that had grown the most."""
-    description = live.description
-    columns = description.state_columns()
-    now = live.state()
-    growth = np.abs(now) / np.maximum(np.abs(initial[columns]), 1.0)
-    worst = int(np.argmax(growth))
-    name = description.columns[columns[worst]].name
-    return (
-        f"the state became non-finite in step {done + 1}, after t = {done * plan.step:.6g} s. "
-        f"In the last finite state {name} = {now[worst]:.6g} had grown the most. "
-        f"{_advice(plan)}"
-    )
-
-
 def _advice(plan: Plan) -> str:
-    return f"Try a shorter step than {plan.step:.6g} s."
-
-
-def meet_tolerance(
-    library: SceneLibrary,
-    state: Sequence[float | Fraction] | Vector,
-    *,
-    method: str,
-    end: float,
-    tolerance: float,
-    every: int | None,
-    new_recorder: Callable[[], Recorder],
-    progress: Progress | None = None,
-    interruption: Interruption | None = None,
-) -> tuple[Outcome, Recorder]:
-    """Halve the step until the final states of two runs differ by at most `tolerance`.
-
-    The difference is the largest over all bodies of |ΔM| (any component, the sign of M fixed) and
-    |Δμ| over the norm of the initial momentum.  The finer run of the last pair is returned with its
-    recorder; the others are discarded.  Status "failed" with the reason in `problem` when rounding,
-    chaos or the cap on halvings comes first.  `every` None keeps about two thousand rows.
-    """
-    if not (math.isfinite(tolerance) and tolerance > 0):
-        raise UsageError(f"tolerance must be a positive number, not {tolerance!r}.")
-    plan(method, end=end, step=end, every=1 if every is None else every)
-    step = first_step(library, state, method=method, end=end)
-    rungs: list[Rung] = []
-    best: tuple[Outcome, Recorder] | None = None
-    achieved: float | None = None
-    reason = ""
-    status: Status = "failed"
-    interruption = Interruption() if interruption is None else interruption
-    for _ in range(_MOST_HALVINGS + 1):
-        rung_plan = plan(method, end=end, step=step, every=1)
-        rung_plan = replace(
-            rung_plan,
-            every=max(1, rung_plan.steps // _ROWS_OF_A_TOLERANCE_RUN) if every is None else every,
-        )
-        recorder = new_recorder()
-        outcome = integrate(
-            library,
-            state,
-            rung_plan,
-            recorder,
-            progress=progress,
-            interruption=interruption,
-            stage=f"step {rung_plan.step:.3g} s",
-        )
-        difference = None
-        if best is not None and best[0].status == outcome.status == "finished":
-            difference = state_difference(library.description, best[0], outcome)
-        rungs.append(
-            Rung(
-                rung_plan.step,
-                rung_plan.steps,
-                difference,
-                outcome.status,
-                outcome.integrate_s,
-            )
-        )
-        if outcome.status == "interrupted" and best is not None:
-            # A whole run with a longer step says more than a part of the next one.
-            recorder.discard()
-            status = "interrupted"
-            break
-        if best is not None:
-            best[1].discard()
-        best = outcome, recorder
-        achieved = difference
-        if outcome.status == "interrupted":
-            status = "interrupted"
-            break
-        if difference is not None and difference <= tolerance:
-            status = "finished"
-            break
-        reason = _hopeless(rungs)
-        if reason:
-            break
-        # Half of the step in use, so that the steps of a rung are nested in the next one's.
-        step = rung_plan.step / 2
-        if rung_plan.steps * 2 >= _MOST_STEPS:
-            reason = "the number of steps would grow without bound."
-            break
-    else:
-        reason = f"{_MOST_HALVINGS} halvings of the step were not enough."
-    assert best is not None
-    outcome, recorder = best
-    if status == "failed":
-        reason = f"the tolerance {tolerance:g} was not met: {reason}"
-        if outcome.problem:
-            reason += f" In the last run {outcome.problem}"
-    ladder = Ladder(tolerance, achieved, tuple(rungs))
-    return replace(outcome, status=status, problem=reason, ladder=ladder), recorder
-
-
-def _hopeless(rungs: Sequence[Rung]) -> str:
-    """Why further halving would not help; "" while it may."""
-    differences = [rung.difference for rung in rungs if rung.difference is not None]
-    if not differences:
-        return ""
-    best = min(differences)
-    if best >= _TOGETHER:
-        if len(rungs) <= _PATIENCE:
-            return ""
-        return (
-            f"after {len(rungs) - 1} halvings of the step the runs still end in different places. "
-            "The motion is chaotic over this time: end it earlier."
-        )
-    if differences.index(best) >= len(differences) - _STALLED_RUNGS:
-        return ""
-    return (
-        f"the runs came within {best:.2g} of each other and not closer. The motion amplifies "
-        "rounding errors to that size: ask for no less, or end it earlier."
-    )
-
-
-def first_step(
-    library: SceneLibrary, state: Sequence[float | Fraction] | Vector, *, method: str, end: float
-) -> float:
-    """A step to begin a ladder with, seconds: from how fast the initial state changes.
-
-    One very short step gives the rates of the motor's and the momentum's components; the guess lets
-    no component change by more than a quarter of its natural size, and takes at least 16 steps.
-    """
-    description = library.description
-    start = np.asarray(state, dtype=np.float64)
-    longest = end / 16
-    probe = end * 2.0**-20
-    with library.start(method, step=probe, state=start) as live:
-        if live.advance(1, 1, None) < 1:
-            return longest
-        rates = np.abs(live.state() - start) / probe
-    guess = longest
-    motors, momenta = len(description.motor), len(description.momentum)
-    for body in range(len(description.bodies)):
-        at = body * (motors + momenta)
-        momentum = slice(at + motors, at + motors + momenta)
-        size = float(np.linalg.norm(start[momentum]))
-        fastest = float(rates[at : at + motors].max())
-        if size > 0:
-            fastest = max(fastest, float(rates[momentum].max()) / size)
-        if fastest > 0:
-            guess = min(guess, _FIRST_TURN / fastest)
-    return guess
-
-
-def state_difference(description: Description, one: Outcome, other: Outcome) -> float:
-    """How far apart two final states are, by the measure `meet_tolerance` states."""
-    columns = description.state_columns()
-    a, b, start = one.final[columns], other.final[columns], other.initial[columns]
-    motors, momenta = len(description.motor), len(description.momentum)
-    worst = 0.0
-    for body in range(len(description.bodies)):
-        at = body * (motors + momenta)
-        motor = slice(at, at + motors)
-        momentum = slice(at + motors, at + motors + momenta)
-        sign = 1.0 if float(a[motor] @ b[motor]) >= 0 else -1.0
-        size = float(np.linalg.norm(start[momentum])) or float(np.linalg.norm(b[momentum])) or 1.0
-        worst = max(
-            worst,
-            float(np.abs(a[motor] - sign * b[motor]).max()),
-            float(np.abs(a[momentum] - b[momentum]).max()) / size,
-        )
-    return worst
+    if plan.tolerance is not None:
+        return "Try another tolerance or an earlier end."
+    return f"Try a shorter step than {abs(plan.step):.6g} s."

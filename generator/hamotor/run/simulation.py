@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +22,8 @@ from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.remembered import Remembered, key_of
 from hamotor.run.report import Origin, report, to_json
 from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
-from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, meet_tolerance, plan
+from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, plan
+from hamotor.run.tolerance import meet_tolerance
 
 if TYPE_CHECKING:
     from hamotor.scene import GeneralScene, Scene
@@ -35,6 +37,8 @@ _AUTO_REASON = (
     "it keeps every coadjoint orbit exactly and its energy error does not grow over long runs"
 )
 _FALLBACK_METHOD = "rkmk4"
+_ROWS = 1000
+_MOST_TIMES = 10_000_000
 _SMALL_TOLERANCE = 1e-7  # a heavy top's 1e-9 takes order 2 four times as long as order 4
 
 
@@ -57,10 +61,13 @@ class Simulation:
     method: str
     every: int
     spec_hash: str
+    times: tuple[float, ...] | None = None
+    interval: float | None = None
     methods: Mapping[str, int] = field(default_factory=dict)
     read: Callable[[], Scene | GeneralScene] | None = None
     matrix_source: Callable[[str], str] | None = None
     """Gives the C++ text in the matrix representation, for a scalar."""
+    has_events: bool = False
     exact_digits: tuple[str, ...] = ()
     """The initial state in 60 digits."""
 
@@ -137,8 +144,12 @@ class Simulation:
         end: float | None = None,
         step: float | None = None,
         tolerance: float | None = None,
+        local_tolerance: float | None = None,
         method: str | None = None,
         every: int | None = None,
+        times: Sequence[float] | None = None,
+        interval: float | None = None,
+        time_limit: float | None = None,
         scalar: str = "double",
         digits: int | None = None,
         kernels: str = "generated",
@@ -150,11 +161,23 @@ class Simulation:
     ) -> Run:
         """Integrate from t = 0 to `end` (s) and return the run; what is not given, the scene says.
 
-        `step` (s) is shortened if need be so that a whole number of steps ends at `end`.
-        `tolerance` instead asks for a step so short that halving it changes the final state by no
-        more: the largest change of a motor's component, and of a momentum's relative to its initial
-        norm.  Every `every`-th step is recorded, and always the first and the last state; with a
+        `end` before 0 is reached back in time.  `step` (s) is shortened if need be so that a whole
+        number of steps ends at `end`.
+
+        `tolerance` instead asks for an error of the final state, verified by a second run: half the
+        step, or with a method that chooses its steps a sixteenth of the local tolerance, changes it
+        by no more.  That is the largest change of a motor's component, and of a momentum's relative
+        to its initial norm.  `local_tolerance` (1/s) is, for methods that choose their steps, the
+        error they allow themselves per second; nothing is verified, and `step` is how often they
+        deliver the state (a thousandth of `end` if not given).
+
+        Every `every`-th step is recorded, and always the first and the last state; with a
         tolerance, where the scene cannot know the steps, about two thousand rows if not given.
+        `times` (s, in order of the run) instead asks for rows at exactly those times and no others,
+        `interval` (s) for rows at its multiples and at the end: the steps stay as they are, and a
+        row inside one is a part of it, taken on the side, or the method's dense output.
+
+        `time_limit` (s) ends the integration: the run is then "failed", and keeps what it has.
 
         `scalar`: double, float, long_double, quad (33 digits) or mpfr (`digits` of them, 50 if not
         given).  Those with more digits than a double take the scene's numbers in all digits that
@@ -169,21 +192,31 @@ class Simulation:
         With `out` the rows stream to that folder, which then holds `run.json`, `trajectory/`,
         pictures and, with `csv`, `trajectory.csv`; without it nothing is written.
 
-        Raises UsageError, ToolError; RunFailed when a number became non-finite or the tolerance was
-        not met; RunInterrupted after Ctrl-C.  The last two carry in `.run` what was computed, which
-        by then is also on disk.
+        Raises UsageError, ToolError; RunFailed when a step failed, or the tolerance was not met;
+        RunInterrupted after Ctrl-C.  The last two carry in `.run` what was computed, which by then
+        is also on disk.
         """
         if digits is not None:
             if scalar != "mpfr":
                 raise UsageError("digits are for the scalar mpfr.")
             scalar = f"mpfr{digits}"
-        if step is not None and tolerance is not None:
+        if tolerance is not None and (step is not None or local_tolerance is not None):
             raise UsageError("give a step or a tolerance, not both.")
+        if sum(x is not None for x in (every, times, interval)) > 1:
+            raise UsageError("give one of every, times and interval: when to record.")
         if csv and out is None:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
         end = self.end if end is None else end
-        if step is None and tolerance is None:
+        if local_tolerance is not None:
+            step = abs(end) / _ROWS if step is None else step
+        elif step is None and tolerance is None:
             step, tolerance = self.step, self.tolerance
+        if every is None and times is None and interval is None:
+            interval = self.interval
+            if self.times is not None:  # an earlier end than the scene's leaves the later ones out
+                times = [x for x in self.times if 0 <= x / end <= 1] or None
+        if interval is not None:
+            times, every = _at_interval(interval, end, step)
         methods = self.offered(kernels, representation)
         chosen = method or self.method
         if method is None and chosen not in methods and chosen in self.methods:
@@ -205,6 +238,14 @@ class Simulation:
         method = chosen
         if not methods:
             method, reason = choose_method(chosen, description.methods, tolerance)
+        if local_tolerance is not None and method not in description.error_controlled:
+            raise UsageError(
+                f"{method} does not choose its steps, so it has no local tolerance; "
+                f"{', '.join(sorted(description.error_controlled)) or 'no method here'} do."
+            )
+        if description.events == () and self.has_events:
+            raise UsageError(f"{self.name}: has events, which this form of a scene does not find.")
+        deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
 
         def new_recorder() -> Recorder:
             if folder is None:
@@ -215,7 +256,14 @@ class Simulation:
             with Interruption() as interruption:
                 recorder: Recorder
                 if step is not None:
-                    planned = plan(method, end=end, step=step, every=_chosen(every, self.every))
+                    planned = plan(
+                        method,
+                        end=end,
+                        step=step,
+                        every=_chosen(every, self.every),
+                        times=times,
+                        tolerance=local_tolerance,
+                    )
                     recorder = new_recorder()
                     outcome = integrate(
                         compiled.library,
@@ -224,6 +272,7 @@ class Simulation:
                         recorder,
                         progress=shown,
                         interruption=interruption,
+                        deadline=deadline,
                     )
                 elif tolerance is not None:
                     outcome, recorder = meet_tolerance(
@@ -234,12 +283,16 @@ class Simulation:
                         tolerance=tolerance,
                         every=every,
                         new_recorder=new_recorder,
+                        times=times,
                         progress=shown,
                         interruption=interruption,
+                        deadline=deadline,
                     )
                 else:
                     raise UsageError("the scene has neither step nor tolerance; give one of them.")
-                run = self._result(compiled, representation, reason, outcome, recorder, folder)
+                run = self._result(
+                    compiled, representation, reason, outcome, recorder, folder, csv=csv
+                )
         except BaseException:
             if folder is not None:
                 folder.abandon()
@@ -260,6 +313,8 @@ class Simulation:
         outcome: Outcome,
         recorder: Recorder,
         folder: RunFolder | None,
+        *,
+        csv: bool,
     ) -> Run:
         from hamotor import __version__
 
@@ -274,12 +329,18 @@ class Simulation:
         )
         said = report(origin, compiled.build, description, outcome)
         units = units_of(description)
+        names = [event.name for event in outcome.events]
+        rows = np.array([event.row for event in outcome.events])
         if isinstance(recorder, DiskRecorder):
             assert folder is not None
+            recorder.write_events(names, rows, csv=csv)
             folder.publish(recorder, to_json(said))
             return Run(said, folder=folder.path, units=units)
         assert isinstance(recorder, MemoryRecorder)
-        return Run(said, trajectory=recorder.columns(description), units=units)
+        events = {"event": np.array(names)} if names else {}
+        if names:
+            events |= {c.name: rows[:, k] for k, c in enumerate(description.columns)}
+        return Run(said, trajectory=recorder.columns(description), units=units, events=events)
 
 
 @dataclass(frozen=True)
@@ -347,6 +408,9 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "tolerance": found.time.tolerance,
             "method": found.time.method,
             "every": found.output.every,
+            "times": found.output.times,
+            "interval": found.output.interval,
+            "has_events": bool(found.events),
             "spec_hash": found.sha256,
             "methods": methods_offered(found.form if isinstance(found, Scene) else Form.GENERAL),
         }
@@ -396,6 +460,31 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
         read=lambda: scene,
         matrix_source=lambda scalar: matrix_source(scene, scalar),
     )
+
+
+def _at_interval(
+    interval: float, end: float, step: float | None
+) -> tuple[list[float] | None, int | None]:
+    """When to record at the multiples of an interval: at times, or every so many steps."""
+    if not (math.isfinite(interval) and interval > 0):
+        raise UsageError(f"interval must be a positive number of seconds, not {interval!r}.")
+    count = abs(end) / interval
+    if step is not None:
+        steps = abs(end / step)
+        whole = round(steps) / count  # steps from row to row, of a step that divides the end
+        if abs(steps - round(steps)) < 1e-9 * steps and abs(whole - round(whole)) < 1e-12 * whole:
+            return None, round(whole)
+    if count > _MOST_TIMES:
+        raise UsageError(
+            f"{count:.3g} rows at intervals of {interval:g} s are more than {_MOST_TIMES:,}; "
+            "take a longer interval, or one that is a multiple of the step."
+        )
+    times = [math.copysign(interval * k, end) for k in range(int(count * (1 + 1e-12)) + 1)]
+    if abs(times[-1]) < abs(end) * (1 - 1e-12):
+        times.append(end)
+    else:
+        times[-1] = end
+    return times, None
 
 
 def _chosen(asked: int | None, default: int) -> int:

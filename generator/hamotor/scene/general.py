@@ -20,7 +20,7 @@ from hamotor.codegen.algebra import Algebra, reverse_sign
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.exact import decimal, rounded, with_digits
 from hamotor.scene.groups import Group
-from hamotor.scene.model import Output, Time
+from hamotor.scene.model import Event, Output, Time
 from hamotor.scene.motors import Vector
 
 if TYPE_CHECKING:
@@ -81,6 +81,8 @@ class GeneralScene:
     time: Time
     output: Output
     sha256: str
+    events: tuple[Event, ...] = ()
+    """Functions of the state whose zeros a run finds."""
     headers: tuple[str, ...] = ()
     """Texts of the headers of an algebra of the user's own."""
 

@@ -33,7 +33,7 @@ from hamotor.scene.general import (
 )
 from hamotor.scene.groups import Group
 from hamotor.scene.invariants import at_the_start
-from hamotor.scene.model import Output, Time
+from hamotor.scene.model import Event, Output, Time
 from hamotor.scene.table import Table, listed, quoted
 
 UNIT_TOLERANCE = 1e-6
@@ -179,8 +179,47 @@ def read_general(
         time=time,
         output=output,
         sha256=hashlib.sha256(contents).hexdigest(),
+        events=_events(top, system, None if lagrangian else hamiltonian),
         headers=headers,
     )
+
+
+DIRECTIONS = ("both", "rising", "falling")
+
+
+def _events(top: Table, system: _System, hamiltonian: Hamiltonian | None) -> tuple[Event, ...]:
+    """What the file calls events; of rates only where H gives them."""
+    found: list[Event] = []
+    for number, values in enumerate(top.tables("event"), 1):
+        table = Table(top.file, f"event {number}", values, schema.EVENT, top.group)
+        table.refuse_unknown_keys()
+        name, text = table.name("name"), table.expression("expression")
+        if name in (names := [event.name for event in found]):
+            table.fail(f'"{name}" is the name of event {names.index(name) + 1} already', "name")
+        speakers = [
+            Speaker(
+                draft.coordinates,
+                None if hamiltonian is None else hamiltonian.rates[k],
+                momenta=True,
+                kinetic=None if system.lagrangian is not None else draft.kinetic,
+            )
+            for k, draft in enumerate(system.drafts)
+        ]
+        own = _System(system.drafts)
+        words = _vocabulary(table, speakers, own, f"event{number}.")
+        expression = read_number(text, words, f"{top.file}: {table.place}: expression")
+        if not expression.free_symbols - set(own.parameters):
+            table.fail("must depend on the state or on the time t", "expression")
+        found.append(
+            Event(
+                name=name,
+                text=text,
+                expression=expression.subs(own.parameters),
+                direction=table.choice("direction", DIRECTIONS, "directions"),
+                stops=table.flag("stop"),
+            )
+        )
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -129,6 +129,7 @@ def general_source(
         pivots=pivots,
         scales=len(names) > first.dimension,
         quantities=_quantities(system, [x for _, x in own]),
+        events=events_text(scene),
         conserved=[conserved_entry(scene, q, own) for q, _ in invariants],
     )
 
@@ -224,6 +225,25 @@ def has_column(scene: GeneralScene, name: str) -> bool:
     return any(
         name == f"{b.name}.momentum.{g}" for b in scene.bodies for g in scene.group.generators
     )
+
+
+def events_text(scene: GeneralScene) -> dict[str, Any] | None:
+    """What the templates want of a scene's events; their functions over users' motors."""
+    if not scene.events:
+        return None
+    values = {f"value{k}": event.expression for k, event in enumerate(scene.events)}
+    return {
+        "program": ProgramText(scene.system.of(values)),
+        "list": [
+            {
+                "name": text_literal(event.name),
+                "direction": event.direction,
+                "stops": "true" if event.stops else "false",
+                "text": shortened(event.text),
+            }
+            for event in scene.events
+        ],
+    }
 
 
 def _quantities(system: System, expressions: Sequence[Any]) -> dict[str, Any] | None:

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,7 +99,7 @@ class Time:
     """How far, how finely and how a scene is integrated."""
 
     end: float
-    """s."""
+    """s; before 0 the run goes back in time."""
     step: float | None
     """Of a fixed step, s; None where a tolerance is given."""
     tolerance: float | None
@@ -110,10 +110,29 @@ class Time:
 
 @dataclass(frozen=True)
 class Output:
-    """What of a run is recorded."""
+    """What of a run is recorded: every so many steps, at times, or at the multiples of one."""
 
-    every: int
+    every: int = 1
     """Every how many steps a row is written."""
+    times: tuple[float, ...] | None = None
+    """When rows are written, s, in order of the run; None: every so many steps."""
+    interval: float | None = None
+    """Rows at its multiples, s; None: as the others say."""
+
+
+@dataclass(frozen=True)
+class Event:
+    """A function of the state whose zeros a run finds."""
+
+    name: str
+    text: str
+    """As the file has it."""
+    expression: Any
+    """Over the symbols of the scene's coordinates, parameters folded in (SymPy)."""
+    direction: str
+    """`rising`, `falling` or `both`."""
+    stops: bool
+    """Whether the run ends there."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +149,8 @@ class Scene:
     output: Output
     sha256: str
     """Of the file's bytes, hexadecimal."""
+    has_events: bool
+    """Whether the file has events; what they are is read with `general`."""
     reread: Callable[[], GeneralScene] = field(repr=False, compare=False)
     """Reads `general`."""
 
@@ -137,6 +158,11 @@ class Scene:
     def general(self) -> GeneralScene:
         """The same scene with nothing specialised: coordinates on a group and a Hamiltonian."""
         return self.reread()
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """Functions of the state whose zeros a run finds."""
+        return self.general.events if self.has_events else ()
 
     @cached_property
     def potential(self) -> Hamiltonian | None:

@@ -130,20 +130,23 @@ def parse_scene(
     top.refuse_unknown_keys()
     limits = top.table("limits", schema.LIMITS, heading=True)
     bodies = _bodies(top, limits.integer("bodies"))
+    time = _time(top.table("time", schema.TIME, heading=True))
     scene = Scene(
         name=_identifier(name),
         description=top.text("description"),
         group=group,
         bodies=bodies,
         interactions=_interactions(top, bodies, limits.integer("interactions")),
-        time=_time(top.table("time", schema.TIME, heading=True)),
-        output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
+        time=time,
+        output=_output(top, time.end),
         sha256=hashlib.sha256(contents).hexdigest(),
+        has_events=bool(top.tables("event")),
         reread=lambda: _general(top, algebra, name, contents, folder),
     )
     if scene.potential is not None and not scene.general.hamiltonian.autonomous:
         return scene.general
     _refuse_singular_springs(top, scene)
+    scene.events  # noqa: B018  # read now, so that their mistakes are told now
     with np.errstate(all="ignore"):
         if not math.isfinite(sum(scene.initial_energy)):
             top.fail("the energy at the start overflows; choose other units or smaller numbers")
@@ -210,6 +213,7 @@ def _general(top: Table, algebra: str, name: str, contents: bytes, folder: Path)
         counted.append(tables)
     if not counted[0]:
         top.fail("a scene needs at least one [[body]]")
+    time = _time(top.table("time", schema.TIME, heading=True))
     return read_general(
         top,
         name=_identifier(name),
@@ -221,8 +225,8 @@ def _general(top: Table, algebra: str, name: str, contents: bytes, folder: Path)
         acting=counted[1],
         orientation=_orientation,
         mass_distribution=_mass_distribution,
-        time=_time(top.table("time", schema.TIME, heading=True)),
-        output=Output(every=top.table("output", schema.OUTPUT, heading=True).integer("every")),
+        time=time,
+        output=_output(top, time.end),
     )
 
 
@@ -508,16 +512,30 @@ def _refuse_singular_springs(top: Table, scene: Scene) -> None:
             )
 
 
+def _output(top: Table, end: float) -> Output:
+    table = top.table("output", schema.OUTPUT, heading=True)
+    if sum(map(table.has, ("every", "times", "interval"))) == 0:
+        return Output()
+    given = table.one_of("every", "times", "interval")
+    if given == "every":
+        return Output(every=table.integer("every"))
+    if given == "times":
+        return Output(times=table.times("times", end))
+    return Output(interval=table.number("interval"))
+
+
 def _time(table: Table) -> Time:
     end = table.number("end")
+    if end == 0:
+        table.fail("must not be 0: a run takes time, forwards or back", "end")
     step = tolerance = None
     if table.one_of("step", "tolerance") == "step":
         step = table.number("step")
-        if step > end:
+        if step > abs(end):
             table.fail(f"{step:g} is longer than end = {end:g}", "step")
-        if Fraction(end) > schema.MOST_STEPS * Fraction(step):
+        if abs(Fraction(end)) > schema.MOST_STEPS * Fraction(step):
             table.fail(
-                f"end / step is {end / step:.3g}; at most {schema.MOST_STEPS:.0e} steps are"
+                f"end / step is {abs(end) / step:.3g}; at most {schema.MOST_STEPS:.0e} steps are"
                 " allowed",
                 "step",
             )

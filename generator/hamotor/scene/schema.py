@@ -43,7 +43,7 @@ class Key:
     kind: str
     """What the reader checks: `number`, `positive`, `non-negative`, `integer`, `flag`, `text`,
     `name`, `one of`, `vector`, `rotation` (a vector, in the plane a number), `lengths`, `moments`,
-    `quaternion`, `matrix`, `table`, `tables`."""
+    `quaternion`, `matrix`, `times`, `table`, `tables`."""
     doc: str
     unit: str = ""
     default: str | None = None
@@ -99,6 +99,7 @@ SCENE = Section(
         Key("interaction", "tables", "what acts on them", default="[]"),
         Key("hamiltonian", "table", "H, instead of masses"),
         Key("lagrangian", "table", "L, instead of masses"),
+        Key("event", "tables", "functions of the state whose zeros are found", default="[]"),
         Key("time", "table", "how far and how finely to integrate"),
         Key("output", "table", "what to record", default="{}"),
         Key("limits", "table", "how large a scene may be", default="{}"),
@@ -454,11 +455,28 @@ INTERACTIONS = {
     "damping": DAMPING,
 }
 
+EVENT = Section(
+    "[[event]]",
+    "an event",
+    (
+        Key("name", "name", "a letter, then letters, digits and _"),
+        Key(
+            "expression",
+            "expression",
+            "crosses zero at the event; of places, momenta, rates, parameters and the time. A"
+            " crossing is seen where the signs at the two ends of a step differ",
+        ),
+        Key("parameters", "parameters", "names with their values", default="{}"),
+        Key("direction", "one of", "rising, falling or both", default='"both"'),
+        Key("stop", "flag", "whether the run ends there", default="false"),
+    ),
+)
+
 TIME = Section(
     "[time]",
     "[time]",
     (
-        Key("end", "positive", "", unit="s", example="10.0"),
+        Key("end", "number", "not 0; before 0 the run goes back in time", unit="s", example="10.0"),
         Key("step", "positive", "of a fixed step", unit="s", example="0.01"),
         Key(
             "tolerance",
@@ -474,7 +492,25 @@ TIME = Section(
 OUTPUT = Section(
     "[output]",
     "[output]",
-    (Key("every", "integer", "how many steps between two recorded rows", default="1"),),
+    (
+        Key("every", "integer", "how many steps between two recorded rows", default="1"),
+        Key(
+            "times",
+            "times",
+            "instead of every: rows at exactly these times and no others; steps stay as they are",
+            unit="s",
+            example="[0.0, 0.25, 10.0]",
+            active=False,
+        ),
+        Key(
+            "interval",
+            "positive",
+            "instead of every: rows at its multiples, and at the end",
+            unit="s",
+            example="0.1",
+            active=False,
+        ),
+    ),
 )
 
 LIMITS = Section(
@@ -502,6 +538,7 @@ SECTIONS = (
     CYLINDER,
     POINT,
     *INTERACTIONS.values(),
+    EVENT,
     TIME,
     OUTPUT,
     LIMITS,

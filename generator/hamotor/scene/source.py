@@ -56,6 +56,7 @@ def scene_source(
         potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
         recurrence=_recurrence(scene) if method == "taylor" else None,
+        events=_events(scene),
     )
 
 
@@ -184,6 +185,14 @@ def _potential(scene: Scene) -> dict[str, Any] | None:
         "energy": {**text_of(system.energy), "value": value},
         "forque": {**text_of(system.forque), "outputs": [(k, components[k]) for k in sorted(acts)]},
     }
+
+
+def _events(scene: Scene) -> dict[str, Any] | None:
+    if not scene.has_events:
+        return None
+    from hamotor.scene.general_source import events_text
+
+    return events_text(scene.general)
 
 
 def shortened(text: str) -> str:

@@ -146,6 +146,22 @@ class Table:
             self.fail(f"must be at least 1 and at most 10^18, not {kind_of(value)}", name)
         return value
 
+    def times(self, name: str, end: float) -> tuple[float, ...]:
+        """Numbers from 0 to `end`, each later in the run than the one before it."""
+        value = self._value(name)
+        if not isinstance(value, list) or not value:
+            self.fail(f"must be an array of times, s, not {kind_of(value)}", name)
+        found = tuple(
+            self._number(x, f"{name}: number {k} of {len(value)}") + 0.0
+            for k, x in enumerate(value, 1)
+        )
+        for k, (before, x) in enumerate(zip((None, *found), found, strict=False), 1):
+            if not 0 <= x / end <= 1:
+                self.fail(f"number {k}, {x:g}, is not between 0 and end = {end:g}", name)
+            if before is not None and not before / end < x / end:
+                self.fail(f"number {k}, {x:g}, does not come after {before:g}", name)
+        return found
+
     def flag(self, name: str) -> bool:
         """true or false."""
         value = self._value(name)

@@ -500,6 +500,29 @@ class Run {
     }
   }
 
+  /// As `scene::Run::observe_at`.
+  [[nodiscard]] bool observe_at(double time, double* row) const noexcept {
+    return std::visit(
+        [&](auto method) {
+          Run there = *this;
+          const S part = S(time) - now();
+          method.do_step(Scene::system, there.bodies_, now(), part);
+          if (!is_finite(there.bodies_)) return false;
+          for (std::size_t i = 0; i < n; ++i) there.sheets_[i].follow(there.bodies_[i].R);
+          if constexpr (powered) there.work_ = method.work();
+          there.time_ = S(time);
+          there.index_ = 0;
+          there.observe(row);
+          return true;
+        },
+        method_);
+  }
+
+  /// This form has no events.
+  [[nodiscard]] static bool observe_event(std::int64_t /*k*/, double* /*row*/) noexcept {
+    return false;
+  }
+
   /// The state as motors and momenta.
   void read_state(double* state) const noexcept {
     for (std::size_t i = 0; i < n; ++i) {

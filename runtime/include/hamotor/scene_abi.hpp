@@ -21,6 +21,7 @@
 #include <variant>
 #include <vector>
 
+#include "hamotor/events.hpp"
 #include "hamotor/methods.hpp"
 #include "hamotor/number_text.hpp"
 #include "hamotor/scalar.hpp"
@@ -56,6 +57,19 @@ struct Conserved {
   std::array<std::string_view, static_cast<std::size_t>(G::dimension)> norm{};
   double scale = 0;       ///< what to divide by where there are none; 0: no natural scale
   std::size_t index = 0;  ///< among `Scene::quantities`
+};
+
+/// A function of the state whose zeros a run reports: one of `Scene::event_values`.
+struct Event {
+  std::string_view name;
+  Crossing direction = Crossing::both;
+  bool stops = false;  ///< whether the run is over there
+};
+
+/// A scene with events: `event_values(state, t)` are the functions, of the user's body frames.
+template <class Scene>
+concept EventfulScene = requires {
+  { Scene::events.size() } -> std::convertible_to<std::size_t>;  // std::array of Event
 };
 
 /// A scene that says itself where a body is: `place(i, motor)` are those of body i in the columns
@@ -95,6 +109,15 @@ using SystemOf = std::remove_cvref_t<decltype(Scene::system)>;
 /// Whether H changes by itself along the motion, so that a run has an account of the work done.
 template <class Scene>
 inline constexpr bool is_powered = requires { &SystemOf<Scene>::power; };
+
+template <class Scene>
+[[nodiscard]] constexpr std::size_t event_count() noexcept {
+  if constexpr (EventfulScene<Scene>) {
+    return Scene::events.size();
+  } else {
+    return 0;
+  }
+}
 
 template <class Scene>
 inline constexpr std::size_t motor_size =
@@ -355,6 +378,20 @@ struct MethodTable<std::tuple<Method...>, S> {
 template <class Scene>
 using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>, typename Scene::Scalar>;
 
+template <class Scene>
+[[nodiscard]] std::string events_json() {
+  JsonList list;
+  if constexpr (EventfulScene<Scene>) {
+    constexpr std::array<std::string_view, 3> directions{"both", "rising", "falling"};
+    for (const Event& event : Scene::events) {
+      list.add("{\"name\": " + json_string(event.name) + ", \"direction\": " +
+               json_string(directions[static_cast<std::size_t>(event.direction)]) +
+               ", \"stops\": " + (event.stops ? "true" : "false") + '}');
+    }
+  }
+  return list.text();
+}
+
 /// The JSON of `hamotor_describe`.
 template <class Scene>
 [[nodiscard]] std::string description() {
@@ -372,7 +409,8 @@ template <class Scene>
          ",\n \"motor\": " + json_strings(Group::template Element<typename Scene::Scalar>::names) +
          ",\n \"momentum\": " + json_strings(Group::generators) +
          ",\n \"columns\": " + columns_json<Scene>() +
-         ",\n \"conserved\": " + conserved_json<Scene>() + "}\n";
+         ",\n \"conserved\": " + conserved_json<Scene>() +
+         ",\n \"events\": " + events_json<Scene>() + "}\n";
 }
 
 /// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
@@ -448,7 +486,8 @@ class Run {
   }
 
   /// Up to `steps` steps; a row after each whose index is a multiple of `every`.  Returns the steps
-  /// done: fewer mean that a number became non-finite, and the state is the last finite one.
+  /// done: fewer mean that an event happened in the last of them, or that the next one failed; the
+  /// state is then the last that is good.
   [[nodiscard]] std::int64_t advance(std::int64_t steps, std::int64_t every,
                                      double* rows) noexcept {
     return std::visit([&](auto& method) { return advance_with(method, steps, every, rows); },
@@ -477,6 +516,33 @@ class Run {
       if (!has_own_column(conserved)) continue;
       *row++ = static_cast<Number>(value_of(conserved, h, total));
     }
+  }
+
+  /// One row of columns at a time that is not the end of a step, by a part of a step from the
+  /// state now; the run is left as it is.  False where that step fails.
+  [[nodiscard]] bool observe_at(double time, double* row) const noexcept {
+    return std::visit(
+        [&](auto method) {
+          Run there = *this;
+          const S part = S(time) - now();
+          StateOf<System> state = state_;
+          method.do_step(Scene::system, state, now(), part);
+          if (!is_finite(state)) return false;
+          there.stand_at({S(time), state, work_of(method)});
+          there.observe(row);
+          return true;
+        },
+        method_);
+  }
+
+  /// One row of columns where event k happened in the last step; false where it did not.
+  [[nodiscard]] bool observe_event(std::int64_t k, double* row) const noexcept {
+    const auto at = static_cast<std::size_t>(k);
+    if (at >= happened_.size() || !happened_[at]) return false;
+    Run there = *this;
+    there.stand_at(moments_[at]);
+    there.observe(row);
+    return true;
   }
 
   /// The state in the user's body frames.
@@ -508,6 +574,7 @@ class Run {
     if (failure_ != Failure::none) return 0;
     StateOf<System> state = state_;
     for (std::int64_t done = 0; done < steps; ++done) {
+      [[maybe_unused]] const auto before = if_eventful(method);
       method.do_step(Scene::system, state, now(), step_);
       if (!is_finite(state)) {
         failure_ = reason_of(method);
@@ -518,6 +585,8 @@ class Run {
         failure_ = Failure::left_group;
         return done;
       }
+      bool eventful = false;
+      if constexpr (EventfulScene<Scene>) eventful = note_events(before, state);
       state_ = state;
       drift_ = method.drift();
       if constexpr (PoweredSystem<System>) work_ = method.work();
@@ -526,8 +595,75 @@ class Run {
         observe(rows);
         rows += columns<Scene>();
       }
+      if (eventful) return done + 1;
     }
     return steps;
+  }
+
+  /// A state with its time, and the work done until then.
+  struct Moment {
+    S time;
+    StateOf<System> state;
+    S work;
+  };
+
+  void stand_at(const Moment& moment) noexcept {
+    time_ = moment.time;
+    index_ = 0;
+    state_ = moment.state;
+    work_ = moment.work;
+  }
+
+  template <class Method>
+  [[nodiscard]] static S work_of([[maybe_unused]] const Method& method) noexcept {
+    if constexpr (PoweredSystem<System>) {
+      return method.work();
+    } else {
+      return S(0);
+    }
+  }
+
+  template <class Method>
+  [[nodiscard]] static auto if_eventful([[maybe_unused]] const Method& method) noexcept {
+    if constexpr (EventfulScene<Scene>) {
+      return method;
+    } else {
+      return 0;
+    }
+  }
+
+  [[nodiscard]] static auto event_values(const StateOf<System>& state, const S& t) noexcept {
+    StateOf<System> users = state;
+    for (std::size_t i = 0; i < n; ++i) {
+      users.motors[i] = gp(state.motors[i], reverse(Scene::frames[i]));
+      users.momenta[i] = Ad_star_inverse(Scene::frames[i], state.momenta[i]);
+    }
+    return Scene::event_values(users, t);
+  }
+
+  /// Finds the events of the step that `before` takes from the state now to `after`.
+  template <class Method>
+  [[nodiscard]] bool note_events(const Method& before, const StateOf<System>& after) noexcept {
+    bool any = false;
+    const S start = now();
+    const auto values_before = event_values(state_, start);
+    const auto values_after =
+        event_values(after, mul_add(static_cast<S>(index_ + 1), step_, time_));
+    for (std::size_t k = 0; k < Scene::events.size(); ++k) {
+      happened_[k] = crosses(Scene::events[k].direction, values_before[k], values_after[k]);
+      if (!happened_[k]) continue;
+      any = true;
+      const auto value = [&](const StateOf<System>& state, const S& t) {
+        return event_values(state, t)[k];
+      };
+      const S part = locate(Scene::system, before, state_, start, step_, value, values_before[k],
+                            values_after[k]);
+      Method method = before;
+      StateOf<System> state = state_;
+      method.do_step(Scene::system, state, start, part);
+      moments_[k] = {start + part, state, work_of(method)};
+    }
+    return any;
   }
 
   [[nodiscard]] S now() const noexcept { return mul_add(static_cast<S>(index_), step_, time_); }
@@ -615,6 +751,8 @@ class Run {
   Drift<S> drift_;
   S work_{};
   std::int64_t index_ = 0;
+  std::array<bool, event_count<Scene>()> happened_{};
+  std::array<Moment, event_count<Scene>()> moments_{};
   std::int64_t component_ = -1;
   Failure failure_ = Failure::none;
 };
@@ -707,6 +845,14 @@ template <class Scene>
                                                          std::int64_t size) {                   \
     return hamotor::scene::observe_text<Scene>(                                                 \
         *static_cast<const hamotor::scene::RunOf<Scene>*>(run), text, size);                    \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int32_t hamotor_observe_at(const void* run, double time,            \
+                                                       double* row) {                           \
+    return static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe_at(time, row);        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT std::int32_t hamotor_observe_event(const void* run, std::int64_t event,  \
+                                                          double* row) {                        \
+    return static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe_event(event, row);    \
   }                                                                                             \
   HAMOTOR_SCENE_EXPORT void hamotor_state(const void* run, double* state) {                     \
     static_cast<const hamotor::scene::RunOf<Scene>*>(run)->read_state(state);                   \

@@ -1,0 +1,322 @@
+"""A global error target: runs of ever smaller error until two of them agree.
+
+The error of a run is estimated by one of half the step, or, with a method that chooses its steps,
+of a sixteenth of the local tolerance.  The order of the method says where to go from there.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+import numpy as np
+
+from hamotor.errors import UsageError
+from hamotor.run.library import Description, SceneLibrary, Vector
+from hamotor.run.progress import Progress
+from hamotor.run.runner import (
+    Breakdown,
+    Interruption,
+    Ladder,
+    Outcome,
+    Plan,
+    Recorder,
+    Rung,
+    Status,
+    integrate,
+    plan,
+)
+
+_MOST_RUNGS = 32
+_ROWS = 2000
+_TOGETHER = 0.01  # below this difference the runs have begun to converge
+_STALLED_RUNGS = 3
+_PATIENCE = 14
+_FIRST_TURN = 0.25  # a first guess turns the motor by at most a quarter of a radian in a step
+_CONSTANT = 100.0  # a step's error is thought to be (turn in the step)^(order + 1) over this
+_AIM = 0.3  # of the tolerance: a guess by the order should not fail by a little
+_LARGEST_LEAP = 1024.0
+_MOST_STEPS = 1e15
+
+
+def meet_tolerance(
+    library: SceneLibrary,
+    state: Sequence[float | Fraction] | Vector,
+    *,
+    method: str,
+    end: float,
+    tolerance: float,
+    every: int | None,
+    new_recorder: Callable[[], Recorder],
+    times: Sequence[float] | Vector | None = None,
+    progress: Progress | None = None,
+    interruption: Interruption | None = None,
+    deadline: float = math.inf,
+) -> tuple[Outcome, Recorder]:
+    """Run until the final states of two runs differ by at most `tolerance`.
+
+    The second has half the step of the first or less; where the method chooses its steps, at most a
+    sixteenth of its local tolerance.  The difference is the largest over all bodies of |ΔM| (any
+    component, the sign of M fixed) and |Δμ| over the norm of the initial momentum.  The finer run
+    of the last pair is returned with its recorder; the others are discarded.
+
+    Status "failed" with the reason in `problem` when rounding, chaos, the number of runs or
+    `deadline` (of `time.perf_counter`) comes first.  A run that the time left would not suffice for
+    is not begun.  `every` None keeps about two thousand rows, unless there are `times`.
+    """
+    if not (math.isfinite(tolerance) and tolerance > 0):
+        raise UsageError(f"tolerance must be a positive number, not {tolerance!r}.")
+    plan(method, end=end, step=end, every=1 if every is None else every, times=times)
+    climb = _Climb(library, state, method, end, tolerance, every, times)
+    interruption = Interruption() if interruption is None else interruption
+    status: Status = "failed"
+    while climb.reason == "":
+        if climb.too_late(deadline):
+            break
+        recorder = new_recorder()
+        outcome = integrate(
+            library,
+            state,
+            climb.plan,
+            recorder,
+            progress=progress,
+            interruption=interruption,
+            stage=climb.stage,
+            deadline=deadline,
+        )
+        ended = climb.see(outcome, recorder)
+        if ended is not None:
+            status = ended
+            break
+    return climb.result(status)
+
+
+class _Climb:
+    """The rungs so far, the best whole run among them, and what comes next.
+
+    A rung is set by one number, `knob`: the step or, where the method chooses steps, its local
+    tolerance.  The error is expected to go as knob^order; `check` is what the knob is divided by
+    to verify a run.
+    """
+
+    def __init__(
+        self,
+        library: SceneLibrary,
+        state: Sequence[float | Fraction] | Vector,
+        method: str,
+        end: float,
+        tolerance: float,
+        every: int | None,
+        times: Sequence[float] | Vector | None,
+    ) -> None:
+        description = library.description
+        self.description = description
+        self.method, self.end, self.target = method, end, tolerance
+        self.every, self.times = every, times
+        self.controlled = method in description.error_controlled
+        order = description.methods[method]
+        self.order = 1.0 if self.controlled else float(order)
+        self.check = 16.0 if self.controlled else 2.0
+        if self.controlled:
+            self.knob = tolerance / (10 * abs(end))
+        else:
+            self.knob = first_step(
+                library, state, method=method, end=end, order=order, tolerance=tolerance
+            )
+        self.coarser = self.knob
+        self.rungs: list[Rung] = []
+        self.best: tuple[Outcome, Recorder] | None = None
+        self.achieved: float | None = None
+        self.reason = ""
+        self.plan = self._planned()
+
+    def _planned(self) -> Plan:
+        step = abs(self.end) / _ROWS if self.controlled else self.knob
+        tolerance = self.knob if self.controlled else None
+        planned = plan(self.method, end=self.end, step=step, times=self.times, tolerance=tolerance)
+        every = max(1, planned.steps // _ROWS) if self.every is None else self.every
+        return replace(planned, every=every)
+
+    @property
+    def stage(self) -> str:
+        """The next rung, for people."""
+        if self.controlled:
+            return f"local tolerance {self.knob:.3g}"
+        return f"step {abs(self.plan.step):.3g} s"
+
+    def too_late(self, deadline: float) -> bool:
+        """Whether the next run would, by the last one's pace, not end in time."""
+        if not self.rungs or self.best is None:
+            return False
+        pace = self.rungs[-1].integrate_s / max(self.best[0].own_steps, 1)
+        expected = pace * self.plan.steps
+        if self.controlled:
+            expected = self.rungs[-1].integrate_s
+        left = deadline - time.perf_counter()
+        if expected <= left:
+            return False
+        self.reason = (
+            f"the time limit: the next run would take about {expected:.2g} s, "
+            f"and {max(left, 0.0):.2g} s are left."
+        )
+        return True
+
+    def see(self, outcome: Outcome, recorder: Recorder) -> Status | None:
+        """Take a run; its status if the climb is over with it."""
+        difference = None
+        if self.best is not None and self.best[0].status == outcome.status == "finished":
+            difference = state_difference(self.description, self.best[0], outcome)
+        self.rungs.append(
+            Rung(
+                self.plan.step,
+                outcome.own_steps if self.controlled else self.plan.steps,
+                difference,
+                outcome.status,
+                outcome.integrate_s,
+                self.plan.tolerance,
+            )
+        )
+        why = outcome.breakdown.reason if outcome.breakdown else ""
+        late = why == "time_limit"
+        too_fine = why == "step_too_short"
+        if self.best is not None and (late or too_fine or outcome.status == "interrupted"):
+            # A whole run with a longer step says more than a part of the next one.
+            recorder.discard()
+        else:
+            if self.best is not None:
+                self.best[1].discard()
+            self.best = outcome, recorder
+            self.achieved = difference
+        if outcome.status == "interrupted":
+            return "interrupted"
+        if difference is not None and difference <= self.target:
+            return "finished"
+        if late:
+            self.reason = "the time limit passed."
+        elif too_fine:
+            self.reason = outcome.problem
+        else:
+            self.reason = _hopeless(self.rungs)
+        if not self.reason:
+            self._turn_down(difference)
+        return "failed" if self.reason else None
+
+    def _turn_down(self, difference: float | None) -> None:
+        """Set the next rung: a check of the last one, or as far as the order says it is to go."""
+        last = self.knob
+        self.knob = last / self.check
+        if difference is not None and difference < _TOGETHER:
+            # The difference is the error of the coarser of the two.
+            wanted = self.coarser * (_AIM * self.target / difference) ** (1 / self.order)
+            if wanted < last:
+                self.knob = min(self.knob, max(wanted, last / _LARGEST_LEAP))
+        self.coarser = last
+        if len(self.rungs) >= _MOST_RUNGS:
+            self.reason = f"{_MOST_RUNGS} runs were not enough."
+        elif not self.controlled and abs(self.end) / self.knob >= _MOST_STEPS:
+            self.reason = "the number of steps would grow without bound."
+        else:
+            self.plan = self._planned()
+
+    def result(self, status: Status) -> tuple[Outcome, Recorder]:
+        """The best whole run, with what is to be said about it."""
+        assert self.best is not None
+        outcome, recorder = self.best
+        problem, breakdown = "", outcome.breakdown
+        if status == "failed":
+            problem = f"the tolerance {self.target:g} was not met: {self.reason}"
+            if self.achieved is not None:
+                problem += f" The last two whole runs differ by {self.achieved:.2g}."
+            if outcome.problem:
+                problem += f" In the last run {outcome.problem}"
+            breakdown = breakdown or Breakdown(
+                "tolerance", float(outcome.final[0]), outcome.plan.step, "", problem
+            )
+        ladder = Ladder(self.target, self.achieved, tuple(self.rungs))
+        return (
+            replace(outcome, status=status, problem=problem, breakdown=breakdown, ladder=ladder),
+            recorder,
+        )
+
+
+def _hopeless(rungs: Sequence[Rung]) -> str:
+    """Why further halving would not help; "" while it may."""
+    differences = [rung.difference for rung in rungs if rung.difference is not None]
+    if not differences:
+        return ""
+    best = min(differences)
+    if best >= _TOGETHER:
+        if len(rungs) <= _PATIENCE:
+            return ""
+        return (
+            f"after {len(rungs)} runs, each finer than the last, they still end in different "
+            "places. "
+            "The motion is chaotic over this time: end it earlier."
+        )
+    if differences.index(best) >= len(differences) - _STALLED_RUNGS:
+        return ""
+    return (
+        f"the runs came within {best:.2g} of each other and not closer. The motion amplifies "
+        "rounding errors to that size: ask for no less, or end it earlier."
+    )
+
+
+def first_step(
+    library: SceneLibrary,
+    state: Sequence[float | Fraction] | Vector,
+    *,
+    method: str,
+    end: float,
+    order: int,
+    tolerance: float,
+) -> float:
+    """A step to begin a ladder with, seconds: from how fast the initial state changes.
+
+    One very short step gives the fastest relative rate ω of a motor's or a momentum's components;
+    with an error of (h ω)^(order + 1) / 100 a step the tolerance would just be met.  At most a
+    quarter of 1/ω, and at least 16 steps.
+    """
+    description = library.description
+    start = np.asarray(state, dtype=np.float64)
+    longest = abs(end) / 16
+    probe = end * 2.0**-20
+    with library.start(method, step=probe, state=start) as live:
+        if live.advance(1, 1, None) < 1:
+            return longest
+        rates = np.abs(live.state() - start) / abs(probe)
+    omega = 0.0
+    motors, momenta = len(description.motor), len(description.momentum)
+    for body in range(len(description.bodies)):
+        at = body * (motors + momenta)
+        momentum = slice(at + motors, at + motors + momenta)
+        size = float(np.linalg.norm(start[momentum]))
+        omega = max(omega, float(rates[at : at + motors].max()))
+        if size > 0:
+            omega = max(omega, float(rates[momentum].max()) / size)
+    if omega == 0:
+        return longest
+    turn: float = (_CONSTANT * tolerance / max(omega * abs(end), 1.0)) ** (1 / order)
+    return min(longest, min(_FIRST_TURN, turn) / omega)
+
+
+def state_difference(description: Description, one: Outcome, other: Outcome) -> float:
+    """How far apart two final states are, by the measure `meet_tolerance` states."""
+    columns = description.state_columns()
+    a, b, start = one.final[columns], other.final[columns], other.initial[columns]
+    motors, momenta = len(description.motor), len(description.momentum)
+    worst = 0.0
+    for body in range(len(description.bodies)):
+        at = body * (motors + momenta)
+        motor = slice(at, at + motors)
+        momentum = slice(at + motors, at + motors + momenta)
+        sign = 1.0 if float(a[motor] @ b[motor]) >= 0 else -1.0
+        size = float(np.linalg.norm(start[momentum])) or float(np.linalg.norm(b[momentum])) or 1.0
+        worst = max(
+            worst,
+            float(np.abs(a[motor] - sign * b[motor]).max()),
+            float(np.abs(a[momentum] - b[momentum]).max()) / size,
+        )
+    return worst
