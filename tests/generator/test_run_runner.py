@@ -218,6 +218,17 @@ def test_the_cap_on_halvings_is_an_error(
     assert "3 runs were not enough" in outcome.problem
 
 
+def test_a_ladder_that_would_take_too_long_keeps_its_last_whole_run() -> None:
+    simulation = toy({"SLEEP_US": 100})
+    simulation.compile()
+    with pytest.raises(RunFailed, match=r"the time limit.* whole runs differ by") as caught:
+        simulation.run(end=1.0, tolerance=1e-4, method="euler", time_limit=0.8)
+    run = caught.value.run
+    assert run.status == "failed"
+    assert run.t[-1] == 1.0
+    assert 1e-4 < run.report["tolerance"]["achieved"] < 0.1
+
+
 def test_an_interrupted_ladder_keeps_the_last_whole_run() -> None:
     simulation = toy({"SLEEP_US": 100})
     simulation.compile()

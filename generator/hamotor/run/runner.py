@@ -88,7 +88,7 @@ class Plan:
 
     def time(self, index: float | NDArray[np.int64]) -> Any:
         """When these steps are taken, s: an index times the step, so that no rounding piles up."""
-        return self.step * index
+        return self.step * index + 0.0
 
 
 def plan(

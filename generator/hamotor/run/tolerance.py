@@ -39,6 +39,11 @@ _FIRST_TURN = 0.25  # a first guess turns the motor by at most a quarter of a ra
 _CONSTANT = 100.0  # a step's error is thought to be (turn in the step)^(order + 1) over this
 _AIM = 0.3  # of the tolerance: a guess by the order should not fail by a little
 _LARGEST_LEAP = 1024.0
+_OFF_ORDER = 30.0
+_REACHABLE = 1e-13  # what lies below is asked of rounding, not of a method
+_CAUTION = (
+    0.75  # a first guess that is too coarse costs little, one that is too fine may cost hours
+)
 _MOST_STEPS = 1e15
 
 
@@ -121,12 +126,14 @@ class _Climb:
         self.order = 1.0 if self.controlled else float(order)
         self.check = 16.0 if self.controlled else 2.0
         if self.controlled:
-            self.knob = tolerance / (10 * abs(end))
+            self.knob = max(tolerance, _REACHABLE) / (10 * abs(end))
         else:
             self.knob = first_step(
                 library, state, method=method, end=end, order=order, tolerance=tolerance
             )
         self.coarser = self.knob
+        self.pair: tuple[float, float] | None = None
+        self.off_order = False
         self.rungs: list[Rung] = []
         self.best: tuple[Outcome, Recorder] | None = None
         self.achieved: float | None = None
@@ -206,11 +213,12 @@ class _Climb:
 
     def _turn_down(self, difference: float | None) -> None:
         """Set the next rung: a check of the last one, or as far as the order says it is to go."""
-        last = self.knob
+        last = self.knob if self.controlled else abs(self.plan.step)
         self.knob = last / self.check
-        if difference is not None and difference < _TOGETHER:
+        if difference is not None and difference < _TOGETHER and self._follows_order(difference):
             # The difference is the error of the coarser of the two.
-            wanted = self.coarser * (_AIM * self.target / difference) ** (1 / self.order)
+            fall = _AIM * max(self.target, _REACHABLE) / difference
+            wanted = self.coarser * fall ** (1 / self.order)
             if wanted < last:
                 self.knob = min(self.knob, max(wanted, last / _LARGEST_LEAP))
         self.coarser = last
@@ -220,6 +228,16 @@ class _Climb:
             self.reason = "the number of steps would grow without bound."
         else:
             self.plan = self._planned()
+
+    def _follows_order(self, difference: float) -> bool:
+        """Whether errors have fallen as the order says; rounding does not."""
+        expected = math.inf
+        if self.pair is not None:
+            coarser, before = self.pair
+            expected = before * (self.coarser / coarser) ** self.order
+        self.pair = self.coarser, difference
+        self.off_order |= difference > _OFF_ORDER * expected
+        return not self.off_order
 
     def result(self, status: Status) -> tuple[Outcome, Recorder]:
         """The best whole run, with what is to be said about it."""
@@ -276,8 +294,8 @@ def first_step(
     """A step to begin a ladder with, seconds: from how fast the initial state changes.
 
     One very short step gives the fastest relative rate ω of a motor's or a momentum's components;
-    with an error of (h ω)^(order + 1) / 100 a step the tolerance would just be met.  At most a
-    quarter of 1/ω, and at least 16 steps.
+    with an error of (h ω)^(order + 1) / 100 a step tolerance^¾ would just be met.  Between 1/256
+    and a quarter of 1/ω, and at least 16 steps.
     """
     description = library.description
     start = np.asarray(state, dtype=np.float64)
@@ -298,8 +316,9 @@ def first_step(
             omega = max(omega, float(rates[momentum].max()) / size)
     if omega == 0:
         return longest
-    turn: float = (_CONSTANT * tolerance / max(omega * abs(end), 1.0)) ** (1 / order)
-    return min(longest, min(_FIRST_TURN, turn) / omega)
+    aim = max(tolerance, _REACHABLE) ** _CAUTION
+    turn: float = (_CONSTANT * aim / max(omega * abs(end), 1.0)) ** (1 / order)
+    return min(longest, min(_FIRST_TURN, max(turn, _FIRST_TURN / 64)) / omega)
 
 
 def state_difference(description: Description, one: Outcome, other: Outcome) -> float:
