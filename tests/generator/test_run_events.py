@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from pathlib import Path
@@ -187,7 +188,7 @@ def test_events_of_a_general_scene_are_found_with_fixed_and_with_chosen_steps(
     met = simulation.run(method="rkmk87", tolerance=1e-10)
     assert met.report["tolerance"]["achieved"] <= 1e-10
     rungs = [rung["local_tolerance"] for rung in met.report["tolerance"]["ladder"]]
-    assert all(fine <= coarse / 16 for coarse, fine in zip(rungs, rungs[1:], strict=False))
+    assert all(fine <= coarse / 16 for coarse, fine in itertools.pairwise(rungs))
     assert met.position()[-1, 0] == pytest.approx(math.cos(10), abs=1e-10)
     json.dumps(met.report)
 
