@@ -19,6 +19,7 @@ from hamotor.scene import METHODS, Form, bundled_scenes, methods_offered
 
 SCENES = [name for name, _ in bundled_scenes()]
 PACKAGE = Path(hamotor.__file__).parents[1]
+PROBLEMS = PACKAGE.parent / "tests" / "bench" / "problems"
 
 
 def command(*arguments: str, folder: Path) -> subprocess.Popen[str]:
@@ -206,3 +207,23 @@ def test_stages_that_do_not_converge_stop_the_run() -> None:
 def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:
     with pytest.raises(hamotor.UsageError, match=r"this scene offers auto, .*gauss4"):
         choose_method("splitting4", methods_offered(Form.GENERAL))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "steps", "step", "allowed"),
+    [("tumble", 10**8, 0.01, 1e-13), (PROBLEMS / "P1.toml", 10**7, 0.005, 2e-15)],
+)
+def test_energy_wanders_by_rounding_and_has_no_trend(
+    scene: str | Path, steps: int, step: float, allowed: float
+) -> None:
+    run = hamotor.load(scene).run(
+        method="splitting6", end=steps * step, step=step, every=steps // 1000, pictures=False
+    )
+    energy = run.trajectory["energy"]
+    assert len(energy) == 1001
+    errors = energy / energy[0] - 1
+    assert abs(errors).max() < allowed
+    wandering = np.diff(errors)
+    slope, error = wandering.mean(), wandering.std(ddof=1) / np.sqrt(len(wandering))
+    assert abs(slope) < 3 * error, f"{slope:.2e} +- {error:.2e} in a thousandth of the run"

@@ -212,8 +212,12 @@ struct Turning {
 };
 
 /// Turns momenta and rotors about the axis E_k by −θ and θ.
+///
+/// Π between the turns of a step is its start and what was added since: added to itself every time,
+/// its rounding errors would grow, and with them those of the angles.
 template <std::size_t K, class S>
-HAMOTOR_INLINE constexpr void turn_about_axis(const HalfAngle<S>& half, std::array<S, 3>& pi,
+HAMOTOR_INLINE constexpr void turn_about_axis(const HalfAngle<S>& half,
+                                              const std::array<S, 3>& start, std::array<S, 3>& pi,
                                               Turning<S, 3>& change) noexcept {
   constexpr std::size_t i = (K + 1) % 3;
   constexpr std::size_t j = (K + 2) % 3;
@@ -223,10 +227,10 @@ HAMOTOR_INLINE constexpr void turn_about_axis(const HalfAngle<S>& half, std::arr
   const S cosine_less_one = S(-2) * b * b;
   const S change_i = mul_add(cosine_less_one, pi[i], sine * pi[j]);
   const S change_j = mul_add(cosine_less_one, pi[j], -sine * pi[i]);
-  pi[i] = pi[i] + change_i;
-  pi[j] = pi[j] + change_j;
   change.angular[i] = change.angular[i] + change_i;
   change.angular[j] = change.angular[j] + change_j;
+  pi[i] = start[i] + change.angular[i];
+  pi[j] = start[j] + change.angular[j];
 
   auto& q = change.rotor;
   const auto [s, v] = q;
@@ -335,12 +339,12 @@ class PrincipalRotation {
         const S outer_rate = S(0.5) * h * outer_;
         const S inner_rate = S(0.5) * h * inner_;
         for (std::size_t k = 0; k < stages; ++k) {
-          turn<outer>(weights.kicks[k] * outer_rate, turned, change);
-          turn<inner>(weights.drifts[k] * inner_rate, turned, change);
+          turn<outer>(weights.kicks[k] * outer_rate, pi, turned, change);
+          turn<inner>(weights.drifts[k] * inner_rate, pi, turned, change);
         }
-        turn<outer>(weights.kicks[stages] * outer_rate, turned, change);
+        turn<outer>(weights.kicks[stages] * outer_rate, pi, turned, change);
       } else if constexpr (split.axes == 1) {
-        turn<outer>(S(0.5) * h * outer_, turned, change);
+        turn<outer>(S(0.5) * h * outer_, pi, turned, change);
       }
       return change;
     }
@@ -352,7 +356,7 @@ class PrincipalRotation {
   {
     Change change{};
     Angular turned = pi;
-    turn<outer>(S(0.5) * h * outer_, turned, change);
+    turn<outer>(S(0.5) * h * outer_, pi, turned, change);
     return change;
   }
 
@@ -421,7 +425,7 @@ class PrincipalRotation {
           RotorIncrement<S, 3>{cosine_less_one, {ratio * u[0], ratio * u[1], ratio * u[2]}});
     }
     kick(w.kicks[stages]);
-    turn<outer>(S(0.5) * h * outer_, p, change);
+    turn<outer>(S(0.5) * h * outer_, pi, p, change);
     return change;
   }
 
@@ -449,9 +453,9 @@ class PrincipalRotation {
   }
 
   template <std::size_t K>
-  HAMOTOR_INLINE static constexpr void turn(const S& half_per_momentum, Angular& pi,
-                                            Change& change) noexcept {
-    detail::turn_about_axis<K>(HalfAngle<S>::of(half_per_momentum * pi[K]), pi, change);
+  HAMOTOR_INLINE static constexpr void turn(const S& half_per_momentum, const Angular& start,
+                                            Angular& pi, Change& change) noexcept {
+    detail::turn_about_axis<K>(HalfAngle<S>::of(half_per_momentum * pi[K]), start, pi, change);
   }
 
   Angular moments_;
