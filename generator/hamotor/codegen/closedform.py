@@ -14,7 +14,7 @@ from fractions import Fraction
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, Rational, grade, magnitude, ratio
 from hamotor.codegen.element import Element
-from hamotor.codegen.kernel import Kernel, parameters_for, read_off, reversed_value, value_of
+from hamotor.codegen.kernel import Kernel, parameters_for, reversed_value, value_of
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Call,
@@ -22,7 +22,6 @@ from hamotor.codegen.program import (
     MultiplyAdd,
     Name,
     Negative,
-    Number,
     Parameter,
     Product,
     Program,
@@ -34,35 +33,11 @@ from hamotor.codegen.program import (
     polynomial_expression,
     sum_of_products,
 )
+from hamotor.codegen.writer import Writer, outputs_for
 from hamotor.errors import UsageError
 
 ONE = number(1)
 MAXIMUM_DIMENSION = 5
-
-
-class Writer:
-    """Collects bindings; what is already a name or a constant is not bound again."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self.bindings: list[tuple[str, Expression]] = []
-
-    def let(self, name: str, expression: Expression) -> Expression:
-        """Bind an expression and return its name."""
-        match expression:
-            case Name() | Number() | Negative(Name()):
-                return expression
-            case _:
-                self.bindings.append((name, expression))
-                return Name(name)
-
-    def let_polynomial(self, name: str, p: Polynomial) -> Polynomial:
-        """Bind a polynomial, unless it is one factor or none; returns what stands for it."""
-        if not p or (len(p) == 1 and len(next(iter(p))) <= 1):
-            return p
-        content = poly.content(p)
-        self.bindings.append((name, polynomial_expression(poly.scaled(p, ratio(1, content)))))
-        return {(name,): content}
 
 
 @dataclass(frozen=True)
@@ -129,35 +104,6 @@ def one_name(p: Polynomial) -> tuple[int, str]:
     ((monomial, x),) = p.items()
     (name,) = monomial
     return int(x), name
-
-
-def outputs_for(
-    values: Mapping[Blade, Expression], result: Element
-) -> tuple[tuple[str, Expression], ...]:
-    """The components of the result, read off blade coefficients.
-
-    A rate has no place for what no element of its group has: those coefficients are zero there.
-    Raises ValueError where another result has no place for one of them.
-    """
-    held = {blade: x for blade, x in values.items() if blade in result.blades}
-    if len(held) < len(values) and not result.namespace:
-        raise ValueError(f"{result.name} does not hold all grades and blades of the result")
-    names: PolynomialMultivector = {b: {(f"{b}",): 1} for b in held}
-    outputs: list[tuple[str, Expression]] = []
-    for component, p in read_off(names, result).items():
-        total: Expression | None = None
-        for monomial, x in p.items():
-            value = values[int(monomial[0])]
-            if abs(x) == 1:
-                term = value if x > 0 else negative(value)
-                total = term if total is None else Sum(total, term)
-            else:
-                scaled = number(x)
-                total = (
-                    Product(scaled, value) if total is None else MultiplyAdd(scaled, value, total)
-                )
-        outputs.append((component, total if total is not None else number(0)))
-    return tuple(outputs)
 
 
 def _combination(

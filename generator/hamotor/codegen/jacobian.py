@@ -27,7 +27,7 @@ from hamotor.codegen.algebra import (
     magnitude,
     ratio,
 )
-from hamotor.codegen.closedform import Writer, square_of
+from hamotor.codegen.closedform import square_of
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import Kernel, value_of
@@ -46,6 +46,7 @@ from hamotor.codegen.program import (
     polynomial_expression,
     sum_of_products,
 )
+from hamotor.codegen.writer import Writer
 from hamotor.errors import UsageError
 
 MAXIMUM_DIMENSION = 5

@@ -32,14 +32,13 @@ from hamotor.codegen.program import (
 from hamotor.codegen.transcendental import (
     ONE,
     ZERO,
-    Writer,
     axis_part,
     call,
-    outputs_for,
     pitch_pairs,
     quadrivector,
     required_split,
 )
+from hamotor.codegen.writer import Writer, outputs_for
 from hamotor.errors import UsageError
 
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]

@@ -29,7 +29,6 @@ from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import (
     Kernel,
     parameters_for,
-    read_off,
     value_of,
 )
 from hamotor.codegen.polynomial import PolynomialMultivector
@@ -39,7 +38,6 @@ from hamotor.codegen.program import (
     MultiplyAdd,
     Name,
     Negative,
-    Number,
     Product,
     Program,
     Quotient,
@@ -50,6 +48,7 @@ from hamotor.codegen.program import (
     polynomial_expression,
     sum_of_products,
 )
+from hamotor.codegen.writer import Writer, outputs_for
 from hamotor.errors import UsageError
 
 ONE = number(1)
@@ -114,23 +113,6 @@ def required_split(algebra: Algebra, blades: Sequence[Blade], where: str) -> Pla
     return plane
 
 
-class Writer:
-    """Collects bindings; `let` names an expression and returns the name."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self.bindings: list[tuple[str, Expression]] = []
-
-    def let(self, name: str, expression: Expression) -> Expression:
-        """Bind, unless the expression is already a name, its negative or a constant."""
-        if isinstance(expression, Name | Number):
-            return expression
-        if isinstance(expression, Negative) and isinstance(expression.x, Name):
-            return expression
-        self.bindings.append((name, expression))
-        return Name(name)
-
-
 def call(function: str, *arguments: Expression) -> Call:
     """A scalar function of the runtime."""
     return Call(function, arguments)
@@ -148,35 +130,6 @@ def _coefficients(
         blade: writer.let(f"{prefix}_{algebra.blade_name(blade)}", polynomial_expression(p))
         for blade, p in sorted(value.items())
     }
-
-
-def outputs_for(
-    values: Mapping[Blade, Expression], result: Element
-) -> tuple[tuple[str, Expression], ...]:
-    """Read the components of the result off named blade coefficients.
-
-    A rate has no place for what no element of its group has: those coefficients are zero there.
-    Raises ValueError where another result has no place for one of them.
-    """
-    held = {blade: x for blade, x in values.items() if blade in result.blades}
-    if len(held) < len(values) and not result.namespace:
-        raise ValueError(f"{result.name} does not hold all grades and blades of the result")
-    names: PolynomialMultivector = {b: {(f"#{b}",): 1} for b in held}
-    outputs: list[tuple[str, Expression]] = []
-    for component, p in read_off(names, result).items():
-        if len(p) == 1:
-            ((monomial, x),) = p.items()
-            inner = values[int(monomial[0][1:])]
-            if abs(x) == 1:
-                outputs.append((component, signed(int(x), inner)))
-            else:
-                outputs.append((component, Product(number(x), inner)))
-        else:
-            terms: list[tuple[Expression, ...]] = [
-                (number(x), values[int(m[0][1:])]) for m, x in p.items()
-            ]
-            outputs.append((component, sum_of_products(terms)))
-    return tuple(outputs)
 
 
 @dataclass(frozen=True)
