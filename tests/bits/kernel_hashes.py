@@ -34,6 +34,7 @@ SCALARS = ("double", "float")
 CORRECTLY_ROUNDED = frozenset(
     {
         "sqrt",
+        "abs",
         "max_abs",
         "scaling",
         "compensated_dot",

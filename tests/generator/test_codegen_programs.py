@@ -264,6 +264,9 @@ def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
     lines = packed["cga3 gp Even Even"]
     assert lines is not None
     assert sum(line.startswith("const auto sum") for line in lines) == 4
-    assert "const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);" in lines
+    assert "const auto four_b_e01 = lanes::load<S, 12>(b);" in lines
+    half = "four(S(0.5), S(0.5), S(-0.5), S(0.5)) * (sum1 + sum2)"
+    assert f"lanes::store<0>(result, {half});" in lines
+    assert not any(line.startswith("const S ") for line in lines)
     assert any("four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i)" in line for line in lines)
     assert packed["cga3 gp Vector Vector"] is None

@@ -32,8 +32,8 @@ BUILDS = ROOT / ".hamotor" / "build" / "ulp"
 SOURCE = Path(__file__).with_name("ulp.cpp")
 TABLE = Path(__file__).with_name("ulp.md")
 SCALARS = ("double", "float")
-POINTS_OF_EACH = 1_000
-"""Of every kernel of every algebra, beside the 100,000 of those that take every finite input."""
+POINTS = 100_000
+"""Of every form of a function that takes every finite input, and of every kernel."""
 
 BOUND = 4.0
 """Units of the last place of the result's norm that a function may be off."""
@@ -293,14 +293,13 @@ is quadruple precision, which is itself held against multivectors with 100 digit
 
 def main() -> None:
     """Measure, and write the table or print the measurements."""
-    points = 100_000
-    found = measurements(points, fused=processor_can_fuse())
+    found = measurements(POINTS, fused=processor_can_fuse())
     if "--json" in sys.argv[1:]:
         json.dump([m.__dict__ for m in found], sys.stdout, indent=1)
         return
-    each = conditioned.measurements(POINTS_OF_EACH, fused=processor_can_fuse())
-    parts = [introduction(points), table(found) + "\n"]
-    parts += [conditioned.introduction(POINTS_OF_EACH), conditioned.table(each) + "\n"]
+    each = conditioned.measurements(POINTS, fused=processor_can_fuse())
+    parts = [introduction(POINTS), table(found) + "\n"]
+    parts += [conditioned.introduction(POINTS), conditioned.table(each) + "\n"]
     TABLE.write_text("\n".join(parts), encoding="utf-8")
     print(TABLE.read_text(encoding="utf-8"))
 

@@ -417,9 +417,9 @@ template <class S>
   const S t_e12 = dot(-b_e03, w_e123i, b_e0i, w_e012i, -b_e3i, w_e0123);
   const S t_e2i = dot(b_e13, w_e123i, -b_e1i, w_e012i, b_e3i, w_e023i);
   const S t_e1i = dot(-b_e23, w_e123i, b_e2i, w_e012i, b_e3i, w_e013i);
-  const S root = scalar::sqrt(S(4) * omega);
-  const S share = select(dot(S(4), omega, S(-0.25) * square, square) > S(0),
-                         select(square > S(0), S(-2), S(2)) / root, S(0));
+  const S root_omega = scalar::sqrt(S(4) * omega);
+  const S isoclinic = dot(S(4), omega, S(-0.25) * square, square);
+  const S share = select(isoclinic > S(0), select(square > S(0), S(-2), S(2)) / root_omega, S(0));
   const S u_e01 = mul_add(share, -t_e01, b_e01);
   const S u_e02 = mul_add(share, t_e02, b_e02);
   const S u_e12 = mul_add(share, t_e12, b_e12);
@@ -431,7 +431,7 @@ template <class S>
   const S u_e2i = mul_add(share, t_e2i, b_e2i);
   const S u_e3i = mul_add(share, -t_e3i, b_e3i);
   const auto e = scalar::bivector_exponential(
-      square, S(4) * omega, root,
+      square, S(4) * omega, root_omega,
       dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
           dot(-u_e12, u_e12, -u_e13, u_e13, -u_e23, u_e23, u_e0i, u_e0i)));
   const S quad = S(2) * e.quad;
@@ -491,7 +491,7 @@ template <class S>
 /// cayley: Rate -> Versor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 126 mul, 73 add (64 fused), 1 div.
+/// Cost: 125 mul, 74 add (65 fused), 2 div, 1 max_abs, 5 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> cayley(const so41::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.u1;
@@ -514,37 +514,62 @@ template <class S>
   const S omega =
       dot(-w_e012i, w_e012i, -w_e013i, w_e013i, -w_e023i, w_e023i, S(2), w_e0123 * w_e123i);
   const S rest = S(1) - square;
-  const S inverse = S(1) / mul_add(rest, rest, -(S(4) * omega));
+  const S t_e02 = dot(b_e01, w_e012i, -b_e03, w_e023i, b_e13, w_e0123);
+  const S t_e03 = dot(b_e01, w_e013i, b_e02, w_e023i, -b_e12, w_e0123);
+  const S t_e23 = dot(-b_e01, w_e123i, b_e0i, w_e023i, -b_e1i, w_e0123);
+  const S t_e01 = dot(b_e02, w_e012i, b_e03, w_e013i, b_e23, w_e0123);
+  const S t_e13 = dot(b_e02, w_e123i, b_e0i, w_e013i, b_e2i, w_e0123);
+  const S t_e0i = dot(b_e12, w_e012i, b_e13, w_e013i, b_e23, w_e023i);
+  const S t_e3i = dot(b_e12, w_e123i, b_e1i, w_e013i, b_e2i, w_e023i);
+  const S t_e12 = dot(-b_e03, w_e123i, b_e0i, w_e012i, -b_e3i, w_e0123);
+  const S t_e2i = dot(b_e13, w_e123i, -b_e1i, w_e012i, b_e3i, w_e023i);
+  const S t_e1i = dot(-b_e23, w_e123i, b_e2i, w_e012i, b_e3i, w_e013i);
+  const S root_omega = scalar::sqrt(S(4) * omega);
+  const S size = scalar::max_abs(square, (S(2) / S(3)));
+  const S isoclinic = dot(S(4), omega, S(-0.25) * size, size);
+  const S share = select(isoclinic > S(0), select(square > S(0), S(-2), S(2)) / root_omega, S(0));
+  const S u_e01 = mul_add(share, -t_e01, b_e01);
+  const S u_e02 = mul_add(share, t_e02, b_e02);
+  const S u_e12 = mul_add(share, t_e12, b_e12);
+  const S u_e03 = mul_add(share, t_e03, b_e03);
+  const S u_e13 = mul_add(share, t_e13, b_e13);
+  const S u_e23 = mul_add(share, t_e23, b_e23);
+  const S u_e0i = mul_add(share, -t_e0i, b_e0i);
+  const S u_e1i = mul_add(share, t_e1i, b_e1i);
+  const S u_e2i = mul_add(share, t_e2i, b_e2i);
+  const S u_e3i = mul_add(share, -t_e3i, b_e3i);
+  const S near = dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
+                     dot(-u_e12, u_e12, -u_e13, u_e13, -u_e23, u_e23, u_e0i, u_e0i));
+  const S far = square - select(square > S(0), -root_omega, root_omega);
+  const S inverse = S(1) / select(isoclinic > S(0), (S(1) - near) * (S(1) - far),
+                                  mul_add(rest, rest, -(S(4) * omega)));
   const S twice = S(2) * inverse;
   const S linear = rest * twice;
   const S even = S(2) * twice;
-  return {.s = (mul_add(-square, square, S(1)) + S(4) * omega) * inverse,
-          .e23 = dot(linear, b_e23, even, dot(-b_e01, w_e123i, b_e0i, w_e023i, -b_e1i, w_e0123)),
-          .e31 = -dot(linear, b_e13, even, dot(b_e02, w_e123i, b_e0i, w_e013i, b_e2i, w_e0123)),
-          .e12 = dot(linear, b_e12, even, dot(-b_e03, w_e123i, b_e0i, w_e012i, -b_e3i, w_e0123)),
-          .e1i = dot(linear, b_e1i, even, dot(-b_e23, w_e123i, b_e2i, w_e012i, b_e3i, w_e013i)),
-          .e2i = dot(linear, b_e2i, even, dot(b_e13, w_e123i, -b_e1i, w_e012i, b_e3i, w_e023i)),
-          .e3i = dot(linear, b_e3i, even, dot(-b_e12, w_e123i, -b_e1i, w_e013i, -b_e2i, w_e023i)),
-          .e123i = dot(even, w_e123i, even,
-                       dot(b_e0i, w_e123i, -b_e1i, w_e023i, b_e2i, w_e013i, -b_e3i, w_e012i)),
-          .e0i = dot(linear, b_e0i, even, dot(-b_e12, w_e012i, -b_e13, w_e013i, -b_e23, w_e023i)),
-          .e023i = dot(even, w_e023i, even,
-                       dot(b_e01, w_e123i, -b_e12, w_e013i, b_e13, w_e012i, -b_e1i, w_e0123)),
-          .e031i = -dot(even, w_e013i, even,
-                        dot(-b_e02, w_e123i, b_e12, w_e023i, -b_e23, w_e012i, b_e2i, w_e0123)),
-          .e012i = dot(even, w_e012i, even,
-                       dot(b_e03, w_e123i, -b_e13, w_e023i, b_e23, w_e013i, -b_e3i, w_e0123)),
-          .e01 = dot(linear, b_e01, even, dot(-b_e02, w_e012i, -b_e03, w_e013i, -b_e23, w_e0123)),
-          .e02 = dot(linear, b_e02, even, dot(b_e01, w_e012i, -b_e03, w_e023i, b_e13, w_e0123)),
-          .e03 = dot(linear, b_e03, even, dot(b_e01, w_e013i, b_e02, w_e023i, -b_e12, w_e0123)),
-          .e0123 = dot(even, w_e0123, even,
-                       dot(b_e01, w_e023i, -b_e02, w_e013i, b_e03, w_e012i, -b_e0i, w_e0123))};
+  return {.s = select(isoclinic > S(0), mul_add(-near, far, S(1)),
+                      mul_add(-square, square, S(1)) + S(4) * omega) *
+               inverse,
+          .e23 = dot(linear, b_e23, even, t_e23),
+          .e31 = -dot(linear, b_e13, even, t_e13),
+          .e12 = dot(linear, b_e12, even, t_e12),
+          .e1i = dot(linear, b_e1i, even, t_e1i),
+          .e2i = dot(linear, b_e2i, even, t_e2i),
+          .e3i = dot(linear, b_e3i, even, -t_e3i),
+          .e123i = even * w_e123i,
+          .e0i = dot(linear, b_e0i, even, -t_e0i),
+          .e023i = even * w_e023i,
+          .e031i = -(even * w_e013i),
+          .e012i = even * w_e012i,
+          .e01 = dot(linear, b_e01, even, -t_e01),
+          .e02 = dot(linear, b_e02, even, t_e02),
+          .e03 = dot(linear, b_e03, even, t_e03),
+          .e0123 = even * w_e0123};
 }
 
 /// cayley_inverse: Versor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 79 mul, 46 add (41 fused), 2 div, 1 select.
+/// Cost: 130 mul, 87 add (76 fused), 4 div, 1 abs, 6 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr so41::Rate<S> cayley_inverse(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -552,9 +577,43 @@ template <class S>
                                m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2),
                                dot(m.e01, m.e1i, m.e02, m.e2i, m.e03, m.e3i, m.e0123, m.e123i)) /
                                (S(1) - m.s));
-  const S inverse = S(1) / mul_add(shifted, shifted,
-                                   -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i,
-                                        S(2), m.e0123 * m.e123i));
+  const S omega =
+      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
+  const S t_e1i = dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
+  const S t_e0i = dot(m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+  const S t_e01 = dot(-m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
+  const S t_e2i = dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
+  const S t_e02 = dot(-m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
+  const S t_e3i = dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
+  const S t_e03 = dot(-m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
+  const S t_e23 = dot(-m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
+  const S t_e13 = dot(m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
+  const S t_e12 = dot(-m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
+  const S root_omega = scalar::sqrt(omega);
+  const S isoclinic = mul_add(S(-0.25) * shifted, shifted, omega);
+  const S share = select(isoclinic > S(0), select(shifted > S(0), S(-1), S(1)) / root_omega, S(0));
+  const S u_e23 = mul_add(share, t_e23, m.e23);
+  const S u_e13 = mul_add(share, t_e13, -m.e31);
+  const S u_e12 = mul_add(share, t_e12, m.e12);
+  const S u_e1i = mul_add(share, t_e1i, m.e1i);
+  const S u_e2i = mul_add(share, t_e2i, m.e2i);
+  const S u_e3i = mul_add(share, t_e3i, m.e3i);
+  const S u_e0i = mul_add(share, -t_e0i, m.e0i);
+  const S u_e01 = mul_add(share, t_e01, m.e01);
+  const S u_e02 = mul_add(share, t_e02, m.e02);
+  const S u_e03 = mul_add(share, t_e03, m.e03);
+  const S side = select(shifted > S(0), -root_omega, root_omega);
+  const S cosine = m.s + side;
+  const S inverse =
+      S(1) /
+      select(
+          isoclinic > S(0),
+          scalar::abs(select(cosine > S(0), S(1) + cosine,
+                             -dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
+                                  dot(-u_e23, u_e23, -u_e13, u_e13, -u_e12, u_e12, u_e0i, u_e0i)) /
+                                 (S(1) - cosine)) *
+                      (shifted - side)),
+          mul_add(shifted, shifted, -omega));
   const S linear = shifted * inverse;
   return {
       .w23 =

@@ -1266,9 +1266,9 @@ template <class S>
 /// cayley: Bivector -> Motor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 91 mul, 58 add (45 fused), 1 div.
+/// Cost: 71 mul, 42 add (33 fused), 1 div.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
   const S w_e0123 = dot(b.e01, b.e23, -b.e02, b.e13, b.e03, b.e12);
   const S w_e0124 = dot(b.e01, b.e24, -b.e02, b.e14, b.e04, b.e12);
   const S w_e0134 = dot(b.e01, b.e34, -b.e03, b.e14, b.e04, b.e13);
@@ -1301,14 +1301,10 @@ template <class S>
           .e03 = dot(linear, b.e03, even, dot(-b.e12, w_e0123, b.e14, w_e0134, b.e24, w_e0234)),
           .e04 = dot(linear, b.e04, even, dot(-b.e12, w_e0124, -b.e13, w_e0134, -b.e23, w_e0234)),
           .e1234 = even * w_e1234,
-          .e0123 = dot(even, w_e0123, even,
-                       dot(-b.e04, w_e1234, b.e14, w_e0234, -b.e24, w_e0134, b.e34, w_e0124)),
-          .e0124 = dot(even, w_e0124, even,
-                       dot(b.e03, w_e1234, -b.e13, w_e0234, b.e23, w_e0134, -b.e34, w_e0123)),
-          .e0134 = dot(even, w_e0134, even,
-                       dot(-b.e02, w_e1234, b.e12, w_e0234, -b.e23, w_e0124, b.e24, w_e0123)),
-          .e0234 = dot(even, w_e0234, even,
-                       dot(b.e01, w_e1234, -b.e12, w_e0134, b.e13, w_e0124, -b.e14, w_e0123))};
+          .e0123 = even * w_e0123,
+          .e0124 = even * w_e0124,
+          .e0134 = even * w_e0134,
+          .e0234 = even * w_e0234};
 }
 
 /// cayley_inverse: Motor -> Bivector

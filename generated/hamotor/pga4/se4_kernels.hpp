@@ -410,9 +410,9 @@ template <class S>
 /// cayley: Rate -> Motor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 101 mul, 58 add (45 fused), 1 div.
+/// Cost: 81 mul, 42 add (33 fused), 1 div.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const se4::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se4::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -455,14 +455,10 @@ template <class S>
           .e03 = dot(linear, b_e03, even, dot(-b_e12, w_e0123, b_e14, w_e0134, b_e24, w_e0234)),
           .e04 = dot(linear, b_e04, even, dot(-b_e12, w_e0124, -b_e13, w_e0134, -b_e23, w_e0234)),
           .e1234 = even * w_e1234,
-          .e0123 = dot(even, w_e0123, even,
-                       dot(-b_e04, w_e1234, b_e14, w_e0234, -b_e24, w_e0134, b_e34, w_e0124)),
-          .e0124 = dot(even, w_e0124, even,
-                       dot(b_e03, w_e1234, -b_e13, w_e0234, b_e23, w_e0134, -b_e34, w_e0123)),
-          .e0134 = dot(even, w_e0134, even,
-                       dot(-b_e02, w_e1234, b_e12, w_e0234, -b_e23, w_e0124, b_e24, w_e0123)),
-          .e0234 = dot(even, w_e0234, even,
-                       dot(b_e01, w_e1234, -b_e12, w_e0134, b_e13, w_e0124, -b_e14, w_e0123))};
+          .e0123 = even * w_e0123,
+          .e0124 = even * w_e0124,
+          .e0134 = even * w_e0134,
+          .e0234 = even * w_e0234};
 }
 
 /// cayley_inverse: Motor -> Rate

@@ -38,6 +38,8 @@ from hamotor.errors import UsageError
 
 ONE = number(1)
 MAXIMUM_DIMENSION = 5
+NOT_SMALL = Fraction(2, 3)
+"""Where ω > S²/4 and √ω is below half of this, |S| + √ω ≤ 1: exp is a series there."""
 
 
 @dataclass(frozen=True)
@@ -136,11 +138,7 @@ def exp_kernel(
     b = _bivector(algebra, writer, parameter, where)
     square = poly.apply_bilinear(algebra.geometric, b, b)
     parts = square_of(algebra, writer, square, "w", where)
-    twisted = {
-        blade: p
-        for blade, p in poly.apply_bilinear(algebra.geometric, b, parts.quad).items()
-        if grade(blade) == 2
-    }
+    twisted = _twisted(algebra, b, parts.quad)
     negated = {x: poly.scaled(p, -1) for x, p in square.items()}
     planes = _on_planes(algebra, writer, negated, parts.quad)
     if planes:
@@ -148,13 +146,10 @@ def exp_kernel(
         arguments: tuple[Expression, ...] = (w, planes.plus, planes.minus)
     else:
         arguments = (polynomial_expression(parts.number), polynomial_expression(parts.omega))
-        omega = poly.apply_bilinear(algebra.geometric, parts.quad, parts.quad).get(0, {})
-        if any(x > 0 for x in omega.values()):
-            twisted = {
-                blade: writer.let_polynomial(f"t_{algebra.blade_name(blade)}", p)
-                for blade, p in twisted.items()
-            }
-            arguments += _nearly_isoclinic(algebra, writer, b, parts, twisted)
+        if _may_be_isoclinic(algebra, parts.quad):
+            twisted = _named(algebra, writer, "t", twisted)
+            near = _isoclinic(algebra, writer, b, *arguments, parts.content, twisted)
+            arguments += (near.root, near.square)
     writer.let("e", Call("bivector_exponential", arguments))
     out: dict[Blade, Expression] = {0: Name("e.number")}
     terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("e.bivector"), b)]
@@ -167,24 +162,54 @@ def exp_kernel(
     return Kernel("exp", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, notes)
 
 
-def _nearly_isoclinic(
+@dataclass(frozen=True)
+class Isoclinic:
+    """S + W, W² = ω, and a bivector B that commutes with W.
+
+    Where `applies` > 0, that is ω > S²/4 and not small, S + `side` may nearly vanish; `side` = ∓√ω
+    has the sign that S has not.  If S + W = B² (or is a function of it), then what B² is there is
+    `square` = ½ <U²>₀ with U = B + <B W>₂ / `side`, which cancels before it is squared, not after.
+    """
+
+    applies: Expression
+    root: Expression
+    side: Expression
+    square: Expression
+
+
+def _twisted(
+    algebra: Algebra, bivector: PolynomialMultivector, quad: PolynomialMultivector
+) -> PolynomialMultivector:
+    """<B W>₂, where B and W commute: B W has no part of grade 4."""
+    product = poly.apply_bilinear(algebra.geometric, bivector, quad)
+    return {blade: p for blade, p in product.items() if grade(blade) == 2}
+
+
+def _may_be_isoclinic(algebra: Algebra, quad: PolynomialMultivector) -> bool:
+    """Whether W² can be positive, for W with independent components."""
+    omega = poly.apply_bilinear(algebra.geometric, quad, quad).get(0, {})
+    return any(x > 0 for x in omega.values())
+
+
+def _isoclinic(
     algebra: Algebra,
     writer: Writer,
-    b: PolynomialMultivector,
-    parts: Square,
+    bivector: PolynomialMultivector,
+    s: Expression,
+    omega: Expression,
+    content: Rational,
     twisted: PolynomialMultivector,
-) -> tuple[Expression, Expression]:
-    """√ω, and the one of S ± √ω that nearly vanishes where planes are nearly isoclinic.
-
-    That is ½ <U²>₀ with U = B ± <B W>₂ / √ω, which cancels before it is squared, not after.
-    """
-    s, omega = (polynomial_expression(p) for p in (parts.number, parts.omega))
-    root = writer.let("root", Call("sqrt", (omega,)))
-    isoclinic = MultiplyAdd(Product(number(Fraction(-1, 4)), s), s, omega)
-    side = Select(s, number(-parts.content), number(parts.content))
-    share = writer.let("share", Select(isoclinic, Quotient(side, root), number(0)))
+    least: Rational = 0,
+) -> Isoclinic:
+    """twisted: <B W>₂ / content, over names.  least: √ω is small below half of it."""
+    root = writer.let("root_omega", Call("sqrt", (omega,)))
+    size = writer.let("size", Call("max_abs", (s, number(least)))) if least else s
+    quarter = Product(number(Fraction(-1, 4)), size)
+    applies = writer.let("isoclinic", MultiplyAdd(quarter, size, omega))
+    sign = Select(s, number(-content), number(content))
+    share = writer.let("share", Select(applies, Quotient(sign, root), number(0)))
     cancelled: PolynomialMultivector = {}
-    for blade, p in b.items():
+    for blade, p in bivector.items():
         part = MultiplyAdd(
             share, polynomial_expression(twisted.get(blade, {})), polynomial_expression(p)
         )
@@ -192,7 +217,8 @@ def _nearly_isoclinic(
         writer.let(name, part if blade in twisted else polynomial_expression(p))
         cancelled[blade] = {(name,): 1}
     square = poly.apply_bilinear(algebra.geometric, cancelled, cancelled)[0]
-    return root, polynomial_expression(poly.scaled(square, ratio(1, 2)))
+    half = polynomial_expression(poly.scaled(square, ratio(1, 2)))
+    return Isoclinic(applies, root, Select(s, negative(root), root), half)
 
 
 def log_kernel(
@@ -208,11 +234,7 @@ def log_kernel(
     rho = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(rho.keys() - {0}) or any(grade(b) not in (0, 4) for b in square):
         raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
-    twisted = {
-        b: p
-        for b, p in poly.apply_bilinear(algebra.geometric, quad, bivector).items()
-        if grade(b) == 2
-    }
+    twisted = _twisted(algebra, quad, bivector)
     negated = {b: poly.scaled(p, -1) for b, p in square.items()}
     planes = _on_planes(algebra, writer, negated, quad)
     c = polynomial_expression(value[0])
@@ -246,11 +268,11 @@ def cayley_kernel(
     parts = square_of(algebra, writer, square, "w", where)
     one: Polynomial = {(): 1}
     s = polynomial_expression(parts.number)
-    twisted = poly.apply_bilinear(algebra.geometric, b, parts.quad)
+    twisted = _twisted(algebra, b, parts.quad)
     negated = {x: poly.scaled(p, -1) for x, p in square.items()}
     planes = _on_planes(algebra, writer, negated, parts.quad)
-    even: Expression
     determinant: Expression
+    even: Expression
     if planes:
         planes = planes.bound(writer, "square")
         shifted = planes.plus_one().bound(writer, "rest")
@@ -263,6 +285,14 @@ def cayley_kernel(
         omega = polynomial_expression(parts.omega)
         determinant = MultiplyAdd(rest, rest, negative(omega))
         even = Sum(MultiplyAdd(negative(s), s, ONE), omega)
+        if _may_be_isoclinic(algebra, parts.quad):
+            twisted = _named(algebra, writer, "t", twisted)
+            isoclinic = _isoclinic(algebra, writer, b, s, omega, parts.content, twisted, NOT_SMALL)
+            near = writer.let("near", isoclinic.square)
+            far = writer.let("far", Sum(s, negative(isoclinic.side)))
+            apart = Product(Sum(ONE, negative(near)), Sum(ONE, negative(far)))
+            determinant = Select(isoclinic.applies, apart, determinant)
+            even = Select(isoclinic.applies, MultiplyAdd(negative(near), far, ONE), even)
     if parts.omega:
         inverse = writer.let("inverse", Quotient(ONE, determinant))
         twice = writer.let("twice", Product(number(2), inverse))
@@ -380,6 +410,16 @@ def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
     return value
 
 
+def _named(
+    algebra: Algebra, writer: Writer, prefix: str, value: PolynomialMultivector
+) -> PolynomialMultivector:
+    """The value under names."""
+    return {
+        blade: writer.let_polynomial(f"{prefix}_{algebra.blade_name(blade)}", p)
+        for blade, p in value.items()
+    }
+
+
 def _times_name(
     algebra: Algebra,
     writer: Writer,
@@ -434,8 +474,8 @@ def cayley_inverse_kernel(
             quad = {blade: dict.fromkeys((("slip",),), *p.values())}
             inverse = Name("inverse")
         elif omega:
-            less = negative(polynomial_expression(omega[0]))
-            inverse = writer.let("inverse", Quotient(ONE, MultiplyAdd(rest, rest, less)))
+            norm = _norm_squared(algebra, writer, value, rest)
+            inverse = writer.let("inverse", Quotient(ONE, norm))
             linear = writer.let("linear", Product(rest, inverse))
         else:
             linear = writer.let("linear", Quotient(ONE, rest))
@@ -567,6 +607,30 @@ def _one_plus_scalar(algebra: Algebra, writer: Writer, value: PolynomialMultivec
     return "shifted"
 
 
+def _norm_squared(
+    algebra: Algebra, writer: Writer, value: PolynomialMultivector, n: Expression
+) -> Expression:
+    """N² − Q², where M ~M = 1, 1 + M = N + <M>₂ + Q; N is bound.
+
+    Where one of c = s ± √Q² is near −1, N ± √Q² = 1 + c is (1 − c²) / (1 − c), 1 − c² from <M>₂.
+    """
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    omega = polynomial_expression(poly.apply_bilinear(algebra.geometric, quad, quad)[0])
+    if not _may_be_isoclinic(algebra, quad):
+        return MultiplyAdd(n, n, negative(omega))
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
+    omega = writer.let("omega", omega)
+    twisted = _named(algebra, writer, "t", _twisted(algebra, bivector, quad))
+    isoclinic = _isoclinic(algebra, writer, bivector, n, omega, 1, twisted)
+    side = writer.let("side", isoclinic.side)
+    cosine = writer.let("cosine", Sum(polynomial_expression(value[0]), side))
+    beyond = Quotient(negative(isoclinic.square), Sum(ONE, negative(cosine)))
+    near = Select(cosine, Sum(ONE, cosine), beyond)
+    # both have one sign, but for rounding
+    apart = Call("abs", (Product(near, Sum(n, negative(side))),))
+    return Select(isoclinic.applies, apart, MultiplyAdd(n, n, negative(omega)))
+
+
 def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
     """√M = (1 + M) (2 N + 2 Q)^(−1/2), where M ~M = 1, 1 + M = N + <M>₂ + Q, Q of grade 4.
 
@@ -593,9 +657,10 @@ def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str)
         radius = norm
         square: Expression = Product(number(2), norm)
         if omega:
-            less = MultiplyAdd(norm, norm, negative(polynomial_expression(omega[0])))
-            other = _square_subtracted(omega[0])
-            length = Call("length", (norm, other)) if other else Call("sqrt", (less,))
+            if other := _square_subtracted(omega[0]):
+                length = Call("length", (norm, other))
+            else:
+                length = Call("sqrt", (_norm_squared(algebra, writer, value, norm),))
             radius = writer.let("radius", length)
             square = Sum(norm, radius)
             if any(x < 0 for x in omega[0].values()):

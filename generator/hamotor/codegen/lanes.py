@@ -9,7 +9,8 @@ product they neither vectorise one object nor a loop over many.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from itertools import permutations
 
 from hamotor.codegen import cpp
 from hamotor.codegen.program import (
@@ -17,6 +18,7 @@ from hamotor.codegen.program import (
     MultiplyAdd,
     Name,
     Negative,
+    Number,
     Product,
     Program,
     Sum,
@@ -39,43 +41,96 @@ def packed_lines(program: Program) -> list[str] | None:
     if not groups or any(len(names) % WIDTH for names in groups.values()):
         return None
     wanted = dict(statements)
-    place = {
-        f"{p.name}.{c.name}": index
-        for p in program.parameters
-        for index, c in enumerate(p.element.components)
-    }
-    packer = _Packer(place, dict(program.bindings))
+    packer = _Packer(program)
     try:
         texts = []
         for names in groups.values():
             for start in range(0, len(names), WIDTH):
-                lanes = names[start : start + WIDTH]
+                lanes = packer.best_order(names[start : start + WIDTH], wanted)
                 texts.append((lanes, packer.text([wanted[name] for name in lanes])))
     except _Unpackable:
         return None
-    outputs = {name for name, _ in program.outputs}
-    grouped = {name for lanes, _ in texts for name in lanes}
+    place = {
+        name: (f"sum{index}", lane)
+        for index, (lanes, _) in enumerate(texts, 1)
+        for lane, name in enumerate(lanes)
+    }
     said = " ".join(text for _, text in texts)
     lines = [
         f"const S {name} = {cpp.expression_text(expression)};"
         for name, expression in program.bindings
-        if name not in grouped and f"four({name})" in said
+        if name not in place and f"four({name})" in said
     ]
     lines += packer.loads
-    fields: dict[str, str] = {}
-    for index, (lanes, text) in enumerate(texts, 1):
-        lines.append(f"const auto sum{index} = {text};")
-        for lane, name in enumerate(lanes):
-            if name in outputs:
-                fields[name] = f"sum{index}[{lane}]"
-            else:
-                lines.append(f"const S {name} = sum{index}[{lane}];")
-    listed = ", ".join(
-        f".{name} = {fields.get(name) or cpp.expression_text(expression)}"
-        for name, expression in program.outputs
-    )
-    lines.append(f"return {{{listed}}};")
-    return lines
+    lines += [f"const auto sum{index} = {text};" for index, (_, text) in enumerate(texts, 1)]
+    return [*lines, *_returned(program, place)]
+
+
+def _returned(program: Program, place: Mapping[str, tuple[str, int]]) -> list[str]:
+    """The statements that bring the sums into the result, four components at a time if possible."""
+    blocks = [
+        _block(list(program.outputs[start : start + WIDTH]), place)
+        for start in range(0, len(program.outputs), WIDTH)
+    ]
+    if all(blocks):
+        return [
+            f"{cpp.scalar_type(program.result)} result;",
+            *(f"lanes::store<{WIDTH * k}>(result, {text});" for k, text in enumerate(blocks)),
+            "return result;",
+        ]
+    outputs = {name for name, _ in program.outputs}
+    lines = [
+        f"const S {name} = {where}[{lane}];"
+        for name, (where, lane) in place.items()
+        if name not in outputs
+    ]
+    listed = []
+    for name, expression in program.outputs:
+        where, lane = place.get(name, ("", 0))
+        text = f"{where}[{lane}]" if where else cpp.expression_text(expression)
+        listed.append(f".{name} = {text}")
+    return [*lines, f"return {{{', '.join(listed)}}};"]
+
+
+def _block(
+    outputs: Sequence[tuple[str, Expression]], place: Mapping[str, tuple[str, int]]
+) -> str | None:
+    """Four components of the result as one vector: four lanes, or multiples of x ± y for lanes."""
+    if len(outputs) < WIDTH:
+        return None
+
+    def lanes_of(names: Sequence[str]) -> tuple[str, list[int]] | None:
+        found = [place.get(name, ("", 0)) for name in names]
+        wheres = {where for where, _ in found}
+        return (wheres.pop(), [lane for _, lane in found]) if len(wheres) == 1 else None
+
+    if all(name in place for name, _ in outputs):
+        sums = lanes_of([name for name, _ in outputs])
+        return _in_order(*sums) if sums else None
+    factors, sides = [], []
+    for _, expression in outputs:
+        match expression:
+            case Product(Number() as factor, Sum(Name(x), Name(y))):
+                factors.append(factor)
+                sides.append((x, y, "+"))
+            case Product(Number() as factor, Sum(Name(x), Negative(Name(y)))):
+                factors.append(factor)
+                sides.append((x, y, "-"))
+            case _:
+                return None
+    left, right = lanes_of([x for x, _, _ in sides]), lanes_of([y for _, y, _ in sides])
+    signs = {sign for _, _, sign in sides}
+    if not (left and right and left[0] and right[0]) or left[1] != right[1] or len(signs) != 1:
+        return None
+    listed = ", ".join(cpp.expression_text(factor) for factor in factors)
+    both = _in_order(f"({left[0]} {signs.pop()} {right[0]})", left[1])
+    return f"four({listed}) * {both}"
+
+
+def _in_order(vector: str, lanes: Sequence[int]) -> str:
+    if list(lanes) == list(range(WIDTH)):
+        return vector
+    return f"turned<{', '.join(str(lane + 1) for lane in lanes)}>({vector})"
 
 
 def _unsigned(expression: Expression) -> tuple[int, Expression]:
@@ -110,11 +165,30 @@ def _key(expression: Expression) -> tuple[str, ...]:
 
 
 class _Packer:
-    def __init__(self, place: dict[str, int], bindings: dict[str, Expression]) -> None:
-        self._place = place
-        self._bindings = bindings
+    def __init__(self, program: Program) -> None:
+        self._place = {
+            f"{p.name}.{c.name}": (p.name, index)
+            for p in program.parameters
+            for index, c in enumerate(p.element.components)
+        }
+        self._bindings = dict(program.bindings)
         self._registers: dict[frozenset[str], list[str]] = {}
+        self._shuffles: set[tuple[str, tuple[int, ...]]] = set()
         self.loads: list[str] = []
+
+    def best_order(self, names: Sequence[str], wanted: Mapping[str, Expression]) -> list[str]:
+        """The order of lanes that takes the fewest shuffles that no other sum takes."""
+        kept = dict(self._registers), set(self._shuffles), list(self.loads)
+        found = []
+        for order in permutations(names):
+            self.text([wanted[name] for name in order])
+            found.append((len(self._shuffles) + (list(order) != list(names)), list(order)))
+            self._registers, self._shuffles, self.loads = (
+                dict(kept[0]),
+                set(kept[1]),
+                list(kept[2]),
+            )
+        return min(found, key=lambda shuffles_and_order: shuffles_and_order[0])[1]
 
     def text(self, lanes: Sequence[Expression]) -> str:
         """`dot(…)` of vectors for four sums."""
@@ -132,8 +206,28 @@ class _Packer:
                 seconds.append(second)
             if len(firsts) != 1:
                 raise _Unpackable
-            arguments += [f"four({firsts.pop()})", self._second(signs, seconds)]
+            arguments += [firsts.pop(), self._second(signs, seconds)]
+        arguments[::2] = self._broadcast(arguments[::2])
         return f"dot({', '.join(arguments)})"
+
+    def _broadcast(self, firsts: Sequence[str]) -> list[str]:
+        """Each number in all lanes; four sums of components in turn from one register."""
+        texts: list[str] = []
+        while len(texts) < len(firsts):
+            names = list(firsts[len(texts) : len(texts) + WIDTH])
+            if len(set(names)) == WIDTH and (register := self._bound(names)):
+                where = (register.index(name) for name in names)
+                texts += [f"lanes::each<{lane}>({self._name(register)})" for lane in where]
+            else:
+                texts.append(f"four({names[0]})")
+        return texts
+
+    def _bound(self, names: list[str]) -> list[str] | None:
+        """The register of four bindings, where they are a sum of two vectors."""
+        known = self._registers.get(frozenset(names))
+        if known is None and self._sum(names):
+            known = self._register(names)
+        return known if known and known[0] in self._bindings else None
 
     def _second(self, signs: list[int], lanes: list[Expression]) -> str:
         if all(isinstance(x, MultiplyAdd) for x in lanes):
@@ -147,6 +241,8 @@ class _Packer:
         where = [register.index(name) for name in names]
         if where == list(range(WIDTH)) and set(signs) == {1}:
             return self._name(register)
+        if where != list(range(WIDTH)):
+            self._shuffles.add((self._name(register), tuple(where)))
         order = ", ".join(str(s * (k + 1)) for s, k in zip(signs, where, strict=True))
         return f"turned<{order}>({self._name(register)})"
 
@@ -155,11 +251,18 @@ class _Packer:
         if key not in self._registers:
             if any(key & other for other in self._registers):
                 raise _Unpackable  # not blocks of components: more loads than it saves
-            order = sorted(names, key=lambda name: self._place.get(name, -1))
+            order = sorted(names, key=self._first_place)
             self._registers[key] = order
-            loaded = self._sum(order) or f"four({', '.join(order)})"
+            loaded = self._sum(order) or self._loaded(order)
             self.loads.append(f"const auto {self._name(order)} = {loaded};")
         return self._registers[key]
+
+    def _first_place(self, name: str) -> tuple[str, int]:
+        """Where a component stands, or the first that is added in a binding."""
+        match self._bindings.get(name):
+            case Sum(a, _) if isinstance(x := _unsigned(a)[1], Name):
+                name = x.text
+        return self._place.get(name, ("", 0))
 
     def _sum(self, names: list[str]) -> str:
         """Four bindings ±x ± y, as the sum of two vectors."""
@@ -176,6 +279,15 @@ class _Packer:
                 return ""
             texts.append(self._second([s for s, _ in part], [x for _, x in part]))
         return " + ".join(texts)
+
+    def _loaded(self, names: Sequence[str]) -> str:
+        """Four components that stand side by side, or four numbers."""
+        places = [self._place.get(name) for name in names]
+        if first := places[0]:
+            parameter, index = first
+            if places == [(parameter, index + k) for k in range(WIDTH)]:
+                return f"lanes::load<S, {index}>({parameter})"
+        return f"four({', '.join(names)})"
 
     @staticmethod
     def _name(register: list[str]) -> str:

@@ -2,6 +2,7 @@
 // four components.  Lane by lane the same operations as `dot` on scalars, and so the same bits.
 #pragma once
 
+#include <cstring>
 #include <type_traits>
 
 #include "hamotor/scalar.hpp"
@@ -29,6 +30,9 @@ struct Four {
   [[nodiscard]] HAMOTOR_INLINE friend Four operator+(const Four& a, const Four& b) noexcept {
     return {a.lanes + b.lanes};
   }
+  [[nodiscard]] HAMOTOR_INLINE friend Four operator-(const Four& a, const Four& b) noexcept {
+    return {a.lanes - b.lanes};
+  }
   [[nodiscard]] HAMOTOR_INLINE friend Four operator*(const Four& a, const Four& b) noexcept {
     return {a.lanes * b.lanes};
   }
@@ -43,6 +47,24 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE inline Four<S> four(const S& a, const S& b, const S& c,
                                                  const S& d) noexcept {
   return {typename Four<S>::Lanes{a, b, c, d}};
+}
+
+/// Four components of an element that follow each other, from component `first` on.  Written with
+/// the components' names, g++ gathers and scatters them one by one.
+template <class S, int first, class T>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> load(const T& element) noexcept {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) >= (first + 4) * sizeof(S));
+  Four<S> loaded;
+  std::memcpy(&loaded.lanes, reinterpret_cast<const char*>(&element) + first * sizeof(S),
+              4 * sizeof(S));
+  return loaded;
+}
+
+/// The reverse of `load`.
+template <int first, class T, class S>
+HAMOTOR_INLINE inline void store(T& element, const Four<S>& x) noexcept {
+  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) >= (first + 4) * sizeof(S));
+  std::memcpy(reinterpret_cast<char*>(&element) + first * sizeof(S), &x.lanes, 4 * sizeof(S));
 }
 
 [[nodiscard]] HAMOTOR_INLINE inline Four<double> mul_add(const Four<double>& a,
@@ -72,6 +94,12 @@ template <int a, int b, int c, int d, class S>
   }
 }
 
+/// One lane in all four.
+template <int lane, class S>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> each(const Four<S>& x) noexcept {
+  return {__builtin_shufflevector(x.lanes, x.lanes, lane, lane, lane, lane)};
+}
+
 #else
 
 template <class S>
@@ -79,8 +107,14 @@ inline constexpr bool packed = false;
 
 template <class S, class... Rest>
 [[nodiscard]] S four(const S& x, const Rest&... rest) noexcept;
+template <class S, int first, class T>
+[[nodiscard]] S load(const T& element) noexcept;
+template <int first, class T, class S>
+void store(T& element, const S& x) noexcept;
 template <int a, int b, int c, int d, class S>
 [[nodiscard]] S turned(const S& x) noexcept;
+template <int lane, class S>
+[[nodiscard]] S each(const S& x) noexcept;
 
 #endif
 
