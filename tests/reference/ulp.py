@@ -299,7 +299,7 @@ def main() -> None:
         return
     each = conditioned.measurements(POINTS, fused=processor_can_fuse())
     parts = [introduction(POINTS), table(found) + "\n"]
-    parts += [conditioned.introduction(POINTS), conditioned.table(each) + "\n"]
+    parts += [conditioned.introduction(), conditioned.table(each) + "\n"]
     TABLE.write_text("\n".join(parts), encoding="utf-8")
     print(TABLE.read_text(encoding="utf-8"))
 

@@ -458,34 +458,52 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 73 mul, 39 add (37 fused), 1 bivector_logarithm.
+/// Cost: 96 mul, 56 add (52 fused), 1 div, 1 bivector_logarithm, 2 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr so41::Rate<S> log(const Versor<S>& m) noexcept {
+  const S square = dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i, S(2),
+                       dot(-m.e01, m.e1i, -m.e02, m.e2i, -m.e03, m.e3i));
+  const S rho =
+      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
+  const S t_e1i = dot(-m.e123i, m.e23, -m.e031i, m.e3i, m.e012i, m.e2i);
+  const S t_e2i = dot(-m.e123i, m.e31, m.e023i, m.e3i, -m.e012i, m.e1i);
+  const S t_e3i = dot(-m.e12, m.e123i, -m.e023i, m.e2i, m.e031i, m.e1i);
+  const S t_e23 = dot(-m.e01, m.e123i, m.e023i, m.e0i, -m.e0123, m.e1i);
+  const S t_e13 = dot(m.e02, m.e123i, -m.e031i, m.e0i, m.e0123, m.e2i);
+  const S t_e12 = dot(-m.e03, m.e123i, m.e012i, m.e0i, -m.e0123, m.e3i);
+  const S t_e0i = dot(m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+  const S t_e03 = dot(m.e02, m.e023i, -m.e01, m.e031i, -m.e0123, m.e12);
+  const S t_e02 = dot(-m.e023i, m.e03, m.e01, m.e012i, -m.e0123, m.e31);
+  const S t_e01 = dot(m.e03, m.e031i, -m.e012i, m.e02, -m.e0123, m.e23);
+  const S twice = S(2) * m.s;
+  const S omega = twice * twice * rho;
+  const S root_omega = scalar::sqrt(omega);
+  const S isoclinic = mul_add(S(-0.25) * square, square, omega);
+  const S share = select(isoclinic > S(0), select(square > S(0), -twice, twice) / root_omega, S(0));
+  const S u_e23 = mul_add(share, t_e23, m.e23);
+  const S u_e13 = mul_add(share, t_e13, -m.e31);
+  const S u_e12 = mul_add(share, t_e12, m.e12);
+  const S u_e1i = mul_add(share, t_e1i, m.e1i);
+  const S u_e2i = mul_add(share, t_e2i, m.e2i);
+  const S u_e3i = mul_add(share, t_e3i, m.e3i);
+  const S u_e0i = mul_add(share, -t_e0i, m.e0i);
+  const S u_e01 = mul_add(share, t_e01, m.e01);
+  const S u_e02 = mul_add(share, t_e02, m.e02);
+  const S u_e03 = mul_add(share, t_e03, m.e03);
   const auto f = scalar::bivector_logarithm(
-      m.s,
-      dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i, S(2),
-          dot(-m.e01, m.e1i, -m.e02, m.e2i, -m.e03, m.e3i)),
-      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i));
-  return {.w23 = S(-2) * dot(f.bivector, m.e23, f.twisted,
-                             dot(-m.e01, m.e123i, m.e023i, m.e0i, -m.e0123, m.e1i)),
-          .w31 = S(2) * dot(f.bivector, -m.e31, f.twisted,
-                            dot(m.e02, m.e123i, -m.e031i, m.e0i, m.e0123, m.e2i)),
-          .w12 = S(-2) * dot(f.bivector, m.e12, f.twisted,
-                             dot(-m.e03, m.e123i, m.e012i, m.e0i, -m.e0123, m.e3i)),
-          .v1 = S(-2) * dot(f.bivector, m.e1i, f.twisted,
-                            dot(-m.e123i, m.e23, -m.e031i, m.e3i, m.e012i, m.e2i)),
-          .v2 = S(-2) * dot(f.bivector, m.e2i, f.twisted,
-                            dot(-m.e123i, m.e31, m.e023i, m.e3i, -m.e012i, m.e1i)),
-          .v3 = S(-2) * dot(f.bivector, m.e3i, f.twisted,
-                            dot(-m.e12, m.e123i, -m.e023i, m.e2i, m.e031i, m.e1i)),
-          .d = S(2) * dot(f.bivector, m.e0i, f.twisted,
-                          dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12)),
-          .u1 = S(-2) * dot(f.bivector, m.e01, f.twisted,
-                            dot(m.e03, m.e031i, -m.e012i, m.e02, -m.e0123, m.e23)),
-          .u2 = S(-2) * dot(f.bivector, m.e02, f.twisted,
-                            dot(-m.e023i, m.e03, m.e01, m.e012i, -m.e0123, m.e31)),
-          .u3 = S(-2) * dot(f.bivector, m.e03, f.twisted,
-                            dot(m.e02, m.e023i, -m.e01, m.e031i, -m.e0123, m.e12))};
+      m.s, square, rho, isoclinic,
+      dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
+          dot(-u_e23, u_e23, -u_e13, u_e13, -u_e12, u_e12, u_e0i, u_e0i)));
+  return {.w23 = S(-2) * dot(f.bivector, m.e23, f.twisted, t_e23),
+          .w31 = S(2) * dot(f.bivector, -m.e31, f.twisted, t_e13),
+          .w12 = S(-2) * dot(f.bivector, m.e12, f.twisted, t_e12),
+          .v1 = S(-2) * dot(f.bivector, m.e1i, f.twisted, t_e1i),
+          .v2 = S(-2) * dot(f.bivector, m.e2i, f.twisted, t_e2i),
+          .v3 = S(-2) * dot(f.bivector, m.e3i, f.twisted, t_e3i),
+          .d = S(2) * dot(f.bivector, m.e0i, f.twisted, -t_e0i),
+          .u1 = S(-2) * dot(f.bivector, m.e01, f.twisted, t_e01),
+          .u2 = S(-2) * dot(f.bivector, m.e02, f.twisted, t_e02),
+          .u3 = S(-2) * dot(f.bivector, m.e03, f.twisted, t_e03)};
 }
 
 /// cayley: Rate -> Versor

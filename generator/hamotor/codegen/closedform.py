@@ -148,7 +148,7 @@ def exp_kernel(
         arguments = (polynomial_expression(parts.number), polynomial_expression(parts.omega))
         if _may_be_isoclinic(algebra, parts.quad):
             twisted = _named(algebra, writer, "t", twisted)
-            near = _isoclinic(algebra, writer, b, *arguments, parts.content, twisted)
+            near = _isoclinic(algebra, writer, b, *arguments, number(parts.content), twisted)
             arguments += (near.root, near.square)
     writer.let("e", Call("bivector_exponential", arguments))
     out: dict[Blade, Expression] = {0: Name("e.number")}
@@ -197,7 +197,7 @@ def _isoclinic(
     bivector: PolynomialMultivector,
     s: Expression,
     omega: Expression,
-    content: Rational,
+    content: Expression,
     twisted: PolynomialMultivector,
     least: Rational = 0,
 ) -> Isoclinic:
@@ -206,7 +206,7 @@ def _isoclinic(
     size = writer.let("size", Call("max_abs", (s, number(least)))) if least else s
     quarter = Product(number(Fraction(-1, 4)), size)
     applies = writer.let("isoclinic", MultiplyAdd(quarter, size, omega))
-    sign = Select(s, number(-content), number(content))
+    sign = Select(s, negative(content), content)
     share = writer.let("share", Select(applies, Quotient(sign, root), number(0)))
     cancelled: PolynomialMultivector = {}
     for blade, p in bivector.items():
@@ -242,8 +242,16 @@ def log_kernel(
         q = polynomial_expression(quad[planes.blade])
         arguments: tuple[Expression, ...] = (c, q, planes.plus, planes.minus)
     else:
-        others = (square.get(0, {}), rho.get(0, {}))
-        arguments = (c, *(polynomial_expression(p) for p in others))
+        number_part, root = (polynomial_expression(x.get(0, {})) for x in (square, rho))
+        arguments = (c, number_part, root)
+        if _may_be_isoclinic(algebra, quad):
+            # <R>₂² = S + 2 c <R>₄
+            number_part, root = writer.let("square", number_part), writer.let("rho", root)
+            twisted = _named(algebra, writer, "t", twisted)
+            twice = writer.let("twice", Product(number(2), c))
+            omega = writer.let("omega", Product(Product(twice, twice), root))
+            near = _isoclinic(algebra, writer, bivector, number_part, omega, twice, twisted)
+            arguments = (c, number_part, root, near.applies, near.square)
     writer.let("f", Call("bivector_logarithm", arguments))
     terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("f.bivector"), bivector)]
     if twisted:
@@ -287,7 +295,9 @@ def cayley_kernel(
         even = Sum(MultiplyAdd(negative(s), s, ONE), omega)
         if _may_be_isoclinic(algebra, parts.quad):
             twisted = _named(algebra, writer, "t", twisted)
-            isoclinic = _isoclinic(algebra, writer, b, s, omega, parts.content, twisted, NOT_SMALL)
+            isoclinic = _isoclinic(
+                algebra, writer, b, s, omega, number(parts.content), twisted, NOT_SMALL
+            )
             near = writer.let("near", isoclinic.square)
             far = writer.let("far", Sum(s, negative(isoclinic.side)))
             apart = Product(Sum(ONE, negative(near)), Sum(ONE, negative(far)))
@@ -621,7 +631,7 @@ def _norm_squared(
     bivector = {b: p for b, p in value.items() if grade(b) == 2}
     omega = writer.let("omega", omega)
     twisted = _named(algebra, writer, "t", _twisted(algebra, bivector, quad))
-    isoclinic = _isoclinic(algebra, writer, bivector, n, omega, 1, twisted)
+    isoclinic = _isoclinic(algebra, writer, bivector, n, omega, ONE, twisted)
     side = writer.let("side", isoclinic.side)
     cosine = writer.let("cosine", Sum(polynomial_expression(value[0]), side))
     beyond = Quotient(negative(isoclinic.square), Sum(ONE, negative(cosine)))

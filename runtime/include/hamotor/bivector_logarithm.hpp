@@ -100,9 +100,12 @@ template <class S>
 /// separated, between a and b (one of them imaginary for a boost) where those are, and by its power
 /// series near R = 1, where neither is.  Principal: rotations with a + b ≤ π; a sheet is not
 /// changed.
+///
+/// Where `isoclinic` > 0, `near` is the one of S ± 2 c √ρ that may nearly vanish, of the sign that
+/// S has not, without cancellation.
 template <class S>
-[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square,
-                                                      const S& rho) noexcept {
+[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square, const S& rho,
+                                                      const S& isoclinic, const S& near) noexcept {
   const S root = sqrt(abs(rho));
   if (c > S(0) && abs(square) + S(2) * root < S(0.25)) {
     // 1 − c without cancellation: c² = 1 + S − ρ
@@ -111,7 +114,10 @@ template <class S>
   }
   if (!(rho < S(0))) {
     const S twice = S(2) * c * root;
-    return detail::interpolated_logarithm(c, root, square, -(square + twice), -(square - twice));
+    S plus = square + twice;
+    S minus = square - twice;
+    if (isoclinic > S(0)) ((square > S(0)) != (c > S(0)) ? plus : minus) = near;
+    return detail::interpolated_logarithm(c, root, square, -plus, -minus);
   }
   // a boost by a and a rotation by b: c = cosh a cos b, √−ρ = sinh a sin b
   const S spread = sqrt(mul_add(square, square, S(-4) * c * c * rho));
@@ -134,6 +140,13 @@ template <class S>
   // (f₊ + f₋)/2 with a → i a
   const S mean = (-(a * sinh_a * cos_b) - b * cosh_a * sin_b) / gap;
   return {mean, (cot_a - cot_b) / gap};
+}
+
+/// The same where √ρ is 0 or no number: S ± 2 c √ρ cannot cancel.
+template <class S>
+[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square,
+                                                      const S& rho) noexcept {
+  return bivector_logarithm(c, square, rho, S(0), S(0));
 }
 
 /// The same for algebras with a blade J of grade 4, J² = 1: of C = c + q J + … and, without
