@@ -79,6 +79,8 @@ METHODS = (
     Method("gauss4", 4, "Gauss collocation, the same with 2 stages", ANY, ALL),
     Method("gauss6", 6, "the same with 3 stages", ANY, ALL),
     Method("gauss8", 8, "the same with 4 stages", ANY, ALL),
+    Method("gauss12", 12, "the same with 6 stages", ANY, ALL),
+    Method("gauss16", 16, "the same with 8 stages, for the last digits", ANY, ALL),
     Method(
         "taylor", 34, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
     ),

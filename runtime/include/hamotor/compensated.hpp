@@ -27,7 +27,7 @@ inline constexpr int most_series_terms = 60;
 template <class T>
 [[nodiscard]] constexpr bool negligible(const T& term, const T& sum) noexcept {
   using S = typename T::Scalar;
-  return !(largest(term) > scalar::Limits<S>::epsilon() / S(8) * largest(sum));
+  return !(largest(term) > scalar::Limits<S>::epsilon() / S(64) * largest(sum));
 }
 
 /// Σ_{k≥1} f^k(x)/k!, its rounding error relative to itself; `whole()` where the series would

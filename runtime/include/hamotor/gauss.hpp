@@ -11,81 +11,50 @@
 #include <cstddef>
 #include <limits>
 #include <string_view>
+#include <type_traits>
 
 #include "hamotor/compensated.hpp"
+#include "hamotor/gauss_table.hpp"
 #include "hamotor/scalar.hpp"
-#include "hamotor/splitting_schemes.hpp"
+#include "hamotor/stage_equations.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
 
 namespace hamotor {
 
-/// Gauss's quadrature on [0, 1], and the part of the collocation matrix that changes sign with the
-/// direction of time: a_ij − b_j/2.
-template <class S, std::size_t stages>
-struct GaussTable {
-  std::array<S, stages> nodes;
-  std::array<S, stages> weights;
-  std::array<std::array<S, stages>, stages> odd;
-};
-
 namespace detail {
 
-/// The zeros of Legendre's polynomial on [0, 1], those below ½.
-template <std::size_t stages>
-[[nodiscard]] constexpr auto gauss_nodes() noexcept {
-  static_assert(stages >= 1 && stages <= 4);
-  if constexpr (stages == 1) {
-    return std::array<std::string_view, 0>{};
-  } else if constexpr (stages == 2) {
-    return std::array<std::string_view, 1>{"0.2113248654051871177454256097490212721762"};
-  } else if constexpr (stages == 3) {
-    return std::array<std::string_view, 1>{"0.1127016653792583114820734600217600389167"};
-  } else {
-    return std::array<std::string_view, 2>{"0.06943184420297371238802675555359524745214",
-                                           "0.3300094782075718675986671204483776563997"};
+/// B_k/k! for even k (Bernoulli), of which each is about −1/4π² times the one before.
+template <class S>
+[[nodiscard]] constexpr std::array<S, 32> bernoulli_ratios() noexcept {
+  // Σ_{j≤n} c_j/(n + 1 − j)! = 0 for c_j = B_j/j!, n ≥ 1.
+  std::array<S, 65> c{};
+  std::array<S, 66> inverse_factorial{};
+  inverse_factorial[0] = S(1);
+  for (std::size_t k = 1; k < 66; ++k) {
+    inverse_factorial[k] = inverse_factorial[k - 1] / S(static_cast<int>(k));
   }
+  c[0] = S(1);
+  for (std::size_t k = 1; k < 65; ++k) {
+    S sum(0);
+    for (std::size_t j = 0; j < k; ++j) sum = sum + c[j] * inverse_factorial[k + 1 - j];
+    c[k] = -sum;
+  }
+  std::array<S, 32> even{};
+  for (std::size_t k = 0; k < 32; ++k) even[k] = c[2 * k + 2];
+  return even;
 }
 
-/// ∫₀ˣ Π_{k≠j} (y − c_k)/(c_j − c_k) dy.
-template <class S, std::size_t n>
-[[nodiscard]] constexpr S lagrange_integral(const std::array<S, n>& c, std::size_t j,
-                                            const S& x) noexcept {
-  std::array<S, n> polynomial{};
-  polynomial[0] = S(1);
-  for (std::size_t k = 0; k < n; ++k) {
-    if (k == j) continue;
-    const S by = S(1) / (c[j] - c[k]);
-    for (std::size_t d = n; d-- > 0;) {
-      polynomial[d] = by * ((d > 0 ? polynomial[d - 1] : S(0)) - c[k] * polynomial[d]);
-    }
-  }
-  S sum(0);
-  for (std::size_t d = n; d-- > 0;) sum = sum * x + polynomial[d] / S(d + 1);
-  return sum * x;
-}
-
-template <class S, std::size_t stages>
-[[nodiscard]] constexpr GaussTable<S, stages> gauss_table() noexcept {
-  using Wide = CoefficientScalar<S>;
-  std::array<Wide, stages> c{};
-  c[stages / 2] = Wide(1) / Wide(2);
-  constexpr auto lower = gauss_nodes<stages>();
-  for (std::size_t k = 0; k < lower.size(); ++k) {
-    c[k] = decimal<Wide>(lower[k]);
-    c[stages - 1 - k] = Wide(1) - c[k];
-  }
-  GaussTable<S, stages> table{};
-  for (std::size_t j = 0; j < stages; ++j) {
-    const Wide weight = lagrange_integral(c, j, Wide(1));
-    table.nodes[j] = static_cast<S>(c[j]);
-    table.weights[j] = static_cast<S>(weight);
-    for (std::size_t i = 0; i < stages; ++i) {
-      table.odd[i][j] = static_cast<S>(lagrange_integral(c, j, c[i]) - weight / Wide(2));
-    }
-  }
-  return table;
-}
+/// B_k/k! for k = 2, 4, …, rounded to S once.
+template <class S>
+struct BernoulliRatios {
+  static inline const auto values = [] {
+    std::array<S, 32> rounded{};
+    const auto exact = bernoulli_ratios<CoefficientScalar<S>>();
+    for (std::size_t k = 0; k < rounded.size(); ++k) rounded[k] = static_cast<S>(exact[k]);
+    return rounded;
+  }();
+};
 
 /// Σ (−1)^k/(k+1)! f^k(y), the series of dexp where f is ad_ξ and of its transpose where f is
 /// ad*_ξ.
@@ -97,73 +66,98 @@ template <class T, class Map>
   for (int k = 1; k < most_series_terms; ++k) {
     term = (S(-1) / S(k + 1)) * f(term);
     sum = sum + term;
-    if (!(largest(term) > scalar::Limits<S>::epsilon() / S(8) * largest(sum))) break;
+    if (negligible(term, sum)) break;
   }
   return sum;
 }
 
-/// The body rate dexp_ξ V of M̂ exp ξ with ξ̇ = V.
-template <class Rate>
-[[nodiscard]] constexpr Rate dexp_of(const Rate& xi, const Rate& v) noexcept {
-  return dexp_series(v, [&](const Rate& y) { return ad(xi, y); });
+/// Σ (−1)^k B_k/k! f^k(y), the inverse of `dexp_series`.
+template <class T, class Map>
+[[nodiscard]] constexpr T dexp_series_inverse(const T& y, const Map& f) noexcept {
+  using S = typename T::Scalar;
+  const auto& ratios = BernoulliRatios<S>::values;
+  T power = f(y);
+  T sum = mul_add(S(0.5), power, y);
+  for (std::size_t k = 0; k < ratios.size(); ++k) {
+    if (k > 0) power = f(power);
+    power = f(power);
+    const T term = ratios[k] * power;
+    sum = sum + term;
+    if (negligible(term, sum)) break;
+  }
+  return sum;
 }
 
-/// The transpose of dexp_ξ.
+/// The rate ξ̇ of M̂ exp ξ with body rate B: dexp_ξ⁻¹ B.
+template <class Rate>
+[[nodiscard]] constexpr Rate chart_rate(const Rate& xi, const Rate& b) noexcept {
+  return dexp_series_inverse(b, [&](const Rate& y) { return ad(xi, y); });
+}
+
+/// The momentum p of the chart, dexp_ξ^T μ.
 template <class Rate, class Momentum>
-[[nodiscard]] constexpr Momentum dexp_transpose(const Rate& xi, const Momentum& mu) noexcept {
+[[nodiscard]] constexpr Momentum chart_momentum(const Rate& xi, const Momentum& mu) noexcept {
   return dexp_series(mu, [&](const Momentum& y) { return coadjoint(xi, y); });
 }
 
-/// ∂/∂ξ <μ, dexp_ξ V> = −Σ_k d_k Σ_{j+l=k−1} ad*(ad_ξ^l V) (ad*_ξ)^j μ, d_k = (−1)^k/(k+1)!.
+/// The momentum μ of the body, dexp_ξ^−T p.
 template <class Rate, class Momentum>
-[[nodiscard]] constexpr Momentum dexp_gradient(const Rate& xi, const Rate& v,
-                                               const Momentum& mu) noexcept {
+[[nodiscard]] constexpr Momentum body_momentum(const Rate& xi, const Momentum& p) noexcept {
+  return dexp_series_inverse(p, [&](const Momentum& y) { return coadjoint(xi, y); });
+}
+
+/// ṗ = d/dt dexp_ξ^T μ at ξ̇ = V and μ̇, which is −∂H/∂ξ at constant p where μ̇ = [μ, B] − F.
+template <class Rate, class Momentum>
+[[nodiscard]] constexpr Momentum chart_force(const Rate& xi, const Rate& v, const Momentum& mu,
+                                             const Momentum& mu_rate) noexcept {
   using S = typename Rate::Scalar;
-  std::array<Rate, most_series_terms> rates{};
-  std::array<Momentum, most_series_terms> momenta{};
-  rates[0] = v;
-  momenta[0] = mu;
-  Momentum sum{};
-  S factor(-1);
-  for (std::size_t k = 1; k < most_series_terms; ++k) {
-    // Of rates and momenta in turn, so that each power is bounded by (k + 1)! with its factor.
-    factor = factor * (S(-1) / S(k + 1));
-    Momentum part{};
-    for (std::size_t l = 0; l < k; ++l) part = part + coadjoint(rates[l], momenta[k - 1 - l]);
-    const Momentum term = factor * part;
-    sum = sum + term;
-    if (k > 1 && !(largest(term) > scalar::Limits<S>::epsilon() / S(8) * largest(sum))) break;
-    rates[k] = ad(xi, rates[k - 1]);
-    momenta[k] = coadjoint(xi, momenta[k - 1]);
+  Momentum term = mu;
+  Momentum change = mu_rate;
+  Momentum sum = mu_rate;
+  for (int k = 1; k < most_series_terms; ++k) {
+    const S by = S(-1) / S(k + 1);
+    change = by * (coadjoint(v, term) + coadjoint(xi, change));
+    term = by * coadjoint(xi, term);
+    sum = sum + change;
+    if (negligible(change, sum) && k > 1) break;
   }
   return sum;
 }
 
 [[nodiscard]] constexpr std::string_view gauss_name(std::size_t stages) noexcept {
-  constexpr std::array<std::string_view, 4> names{"lie_midpoint", "gauss4", "gauss6", "gauss8"};
+  constexpr std::array<std::string_view, 8> names{"lie_midpoint", "gauss4",  "gauss6",  "gauss8",
+                                                  "gauss10",      "gauss12", "gauss14", "gauss16"};
   return names[stages - 1];
 }
 
 }  // namespace detail
 
-/// Gauss collocation on the group, s stages, order 2s, for any H(M, μ, t).
+/// Gauss collocation on the group, s = 1 to 8 stages, order 2s, for any H(M, μ, t).
 ///
 /// With chart momenta p = dexp_ξ^T μ and W = −∂H/∂ξ a stage is
 ///     ξ_i = h Σ ã_ij V_j,  p_i = ½(p₀ + p₁) + h Σ ã_ij W_j,  ã_ij = a_ij − b_j/2,
 /// and momenta obey M₁μ₁M̃₁ = M₀μ₀M̃₀ − h Σ b_i F_i, F_i the stages' spatial forques: where H is
-/// left-invariant, spatial momentum and Casimirs are constant but for rounding.  Stages are
-/// iterated to a fixed point, which contracts while a step turns by less than about a radian; where
-/// it does not in 100 iterations, the state becomes not a number.
+/// left-invariant, spatial momentum and Casimirs are constant but for rounding.
+///
+/// V and W are iterated until rounding stops them (Hairer, McLachlan & Razakarivony 2008), from the
+/// last step's polynomials: to a fixed point while that contracts, else by Newton's method with one
+/// Jacobian for many steps, so that stiff springs converge too (up to 48 unknowns a stage: four
+/// bodies in space).  Where neither settles in 20 iterations and one a bit, the state becomes not a
+/// number.
 template <HamiltonianSystem System, std::size_t stages>
 class Gauss {
+  static_assert(stages >= 1 && stages <= 8);
   using S = typename System::Scalar;
   using G = typename System::Group;
   using Element = typename G::template Element<S>;
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
   static constexpr std::size_t n = System::bodies;
+  static constexpr auto dimension = static_cast<std::size_t>(G::dimension);
+  static constexpr std::size_t unknowns = 2 * n * dimension;
+  static constexpr bool has_newton = unknowns <= 48;
+  static constexpr int most_iterations = 20 + scalar::Limits<S>::digits;
   static inline const auto table = detail::gauss_table<S, stages>();
-  static constexpr int most_iterations = 100;
 
  public:
   static constexpr int order = 2 * static_cast<int>(stages);
@@ -172,39 +166,16 @@ class Gauss {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
-    start(system, state, t, h);
-    S before(0);
-    bool settled = false;
-    for (iterations_ = 0; !settled && iterations_ < most_iterations;) {
-      const S change = iterate(system, state, t, h);
-      ++iterations_;
-      // Rounding is reached where changes are small and shrink no more; the first two need not show
-      // all components.
-      const bool small = change <= S(4096) * scalar::Limits<S>::epsilon();
-      settled = iterations_ > 2 && small && (change <= S(0) || !(change < before));
-      if (!(change - change == S(0))) break;
-      before = change;
+    if (foresees_ && failure_ == Failure::none && h == h_ && state == end_) {
+      foresee();
+    } else {
+      stay(system, state, t);
     }
-    failure_ = settled ? Failure::none : Failure::no_convergence;
-    S worst(0);
-    for (std::size_t i = 0; i < n; ++i) {
-      auto& motor = state.motors[i];
-      // By halves as in `iterate`: what the last iteration left does not enter spatial momenta.
-      motor = gp(gp(motor, half_[i]), half_[i]);
-      const auto defect = unit_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
-      motor = motor + unit_correction(motor, defect);
-      state.momenta[i] = Ad_star(half_[i], last_[i]);
-      if (!settled) {
-        state.momenta[i] = S(std::numeric_limits<double>::quiet_NaN()) * state.momenta[i];
-      }
-    }
-    if constexpr (PoweredSystem<System>) {
-      for (std::size_t s = 0; s < stages; ++s) {
-        work_ = mul_add(h * table.weights[s], power_[s], work_);
-      }
-    }
-    detail::record(drift_, worst);
+    h_ = h;
+    for (std::size_t s = 0; s < stages; ++s) step_weights_[s] = h * table.weights[s];
+    begin(state);
+    failure_ = solve(system, state, t) ? Failure::none : Failure::no_convergence;
+    finish(state);
   }
 
   /// How far the steps so far left the group.
@@ -216,6 +187,9 @@ class Gauss {
   /// Iterations of the last step, each `stages` evaluations.
   [[nodiscard]] constexpr int iterations() const noexcept { return iterations_; }
 
+  /// Whether the last step was solved by Newton's method.
+  [[nodiscard]] constexpr bool by_newton() const noexcept { return newton_.on; }
+
   /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
   [[nodiscard]] constexpr const S& work() const noexcept
     requires PoweredSystem<System>
@@ -224,110 +198,207 @@ class Gauss {
   }
 
  private:
-  /// The first guess: rates and momenta of the start.
-  constexpr void start(const System& system, const StateOf<System>& state, const S& t,
-                       const S& h) noexcept {
+  using Gradients = Gradient<G, n, S>;
+  using Slopes = std::array<Gradients, stages>;
+  using Momenta = std::array<Momentum, n>;
+  using Vector = detail::Vector<S, unknowns>;
+  struct NoNewton {
+    static constexpr bool on = false;
+  };
+  struct Newton {
+    bool on = false;
+    S h{};
+    detail::StageEquations<S, stages, unknowns> equations{};
+  };
+
+  /// The first guess where nothing is known: what is at the start.
+  constexpr void stay(const System& system, const StateOf<System>& state, const S& t) noexcept {
     const auto now = gradient(system, state, t);
     for (std::size_t s = 0; s < stages; ++s) {
-      rates_[s] = now.rates;
-      momenta_[s] = state.momenta;
+      gradients_[s].rates = now.rates;
+      if constexpr (System::has_forque) gradients_[s].forques = now.forques;
     }
-    place(h);
   }
 
-  /// Where the rates lead: ξ of the stages and of the end, from half-way.
-  constexpr void place(const S& h) noexcept {
+  /// The first guess after a step of the same length: its polynomials, gone on.
+  constexpr void foresee() noexcept {
+    const auto gradients = gradients_;
+    for (std::size_t s = 0; s < stages; ++s) {
+      gradients_[s] = {};
+      for (std::size_t r = 0; r < stages; ++r) {
+        const S& by = table.next[s][r];
+        for (std::size_t i = 0; i < n; ++i) {
+          auto& there = gradients_[s];
+          there.rates[i] = mul_add(by, gradients[r].rates[i], there.rates[i]);
+          if constexpr (System::has_forque) {
+            there.forques[i] = mul_add(by, gradients[r].forques[i], there.forques[i]);
+          }
+        }
+      }
+    }
+  }
+
+  /// From the first guess.
+  constexpr void begin(const StateOf<System>& state) noexcept {
+    xi_ = {};
+    beside_ = {};
+    place(state);
+  }
+
+  /// The charts and the momenta that rates and forques of the stages lead to.
+  ///
+  /// Momenta are seen from half-way, m = Ad*⁻¹_{exp ξ} μ with ṁ = −Ad*⁻¹_{exp ξ} F, so that they do
+  /// not turn with the stages while these are iterated: p = dexp_{−ξ}^T m.
+  constexpr void place(const StateOf<System>& state) noexcept {
+    for (int sweep = 0; sweep < 2; ++sweep) {
+      for (std::size_t s = 0; s < stages; ++s) {
+        for (std::size_t i = 0; i < n; ++i) {
+          rates_[s][i] = detail::chart_rate(xi_[s][i], gradients_[s].rates[i]);
+        }
+      }
+      for (std::size_t s = 0; s < stages; ++s) {
+        for (std::size_t i = 0; i < n; ++i) {
+          xi_[s][i] = {};
+          for (std::size_t r = 0; r < stages; ++r) {
+            xi_[s][i] = mul_add(table.skew[s][r] * step_weights_[r], rates_[r][i], xi_[s][i]);
+          }
+        }
+      }
+    }
     for (std::size_t i = 0; i < n; ++i) {
       Rate x{};
-      for (std::size_t s = 0; s < stages; ++s) x = mul_add(table.weights[s], rates_[s][i], x);
-      half_way_[i] = (S(0.5) * h) * x;
-      half_[i] = exp(half_way_[i]);
-      if constexpr (stages > 1) {
-        for (std::size_t s = 0; s < stages; ++s) {
-          Rate there{};
-          for (std::size_t r = 0; r < stages; ++r) {
-            there = mul_add(table.odd[s][r], rates_[r][i], there);
-          }
-          xi_[s][i] = h * there;
-          way_[s][i] = exp(xi_[s][i]);
+      std::array<Momentum, stages> pushes{};
+      taken_[i] = {};
+      for (std::size_t s = 0; s < stages; ++s) {
+        x = mul_add(step_weights_[s], rates_[s][i], x);
+        way_[s][i] = exp(xi_[s][i]);
+        if constexpr (System::has_forque) {
+          pushes[s] = -step_weights_[s] * Ad_star_inverse(way_[s][i], gradients_[s].forques[i]);
+          taken_[i] = taken_[i] - pushes[s];
         }
+      }
+      half_way_[i] = S(0.5) * x;
+      half_[i] = exp(half_way_[i]);
+      const Momentum first = Ad_star(half_[i], state.momenta[i]);
+      const Momentum middle =
+          S(0.5) * (detail::chart_momentum(half_way_[i], first) +
+                    detail::chart_momentum(S(-1) * half_way_[i], first - taken_[i]));
+      const Momentum mean = first - S(0.5) * taken_[i];
+      std::array<Momentum, stages> balanced{};
+      std::array<Momentum, stages> forces{};
+      for (std::size_t s = 0; s < stages; ++s) {
+        balanced[s] = mean;
+        if constexpr (System::has_forque) {
+          for (std::size_t r = 0; r < stages; ++r) {
+            balanced[s] = mul_add(table.skew[s][r], pushes[r], balanced[s]);
+          }
+        }
+        forces[s] = detail::chart_force(S(-1) * xi_[s][i], -step_weights_[s] * rates_[s][i],
+                                        balanced[s] + beside_[s][i], pushes[s]);
+      }
+      for (std::size_t s = 0; s < stages; ++s) {
+        Momentum p = middle;
+        for (std::size_t r = 0; r < stages; ++r) p = mul_add(table.skew[s][r], forces[r], p);
+        const Momentum m = detail::body_momentum(S(-1) * xi_[s][i], p);
+        beside_[s][i] = m - balanced[s];
+        momenta_[s][i] = Ad_star(way_[s][i], m);
       }
     }
   }
 
-  /// Rates from the gradient, then momenta with the new rates; by how much they changed, relative
-  /// to Σ |μ V|.
-  constexpr S iterate(const System& system, const StateOf<System>& state, const S& t,
-                      const S& h) noexcept {
-    S changed(0);
-    S size(0);
-    std::array<std::array<Momentum, n>, stages> forques{};
-    std::array<std::array<Rate, n>, stages> rates = rates_;
-    std::array<std::array<Rate, n>, stages> rate_changes{};
-    S both(0);
+  /// By how much rates and forques there differ from those that led there.
+  [[nodiscard]] constexpr Slopes residual(const System& system, const StateOf<System>& state,
+                                          const S& t) noexcept {
+    StateOf<System> center = state;
+    for (std::size_t i = 0; i < n; ++i) center.motors[i] = gp(state.motors[i], half_[i]);
+    Slopes difference{};
     for (std::size_t s = 0; s < stages; ++s) {
       StateOf<System> there{{}, momenta_[s]};
-      for (std::size_t i = 0; i < n; ++i) {
-        there.motors[i] = gp(state.motors[i], half_[i]);
-        if constexpr (stages > 1) there.motors[i] = gp(there.motors[i], way_[s][i]);
-      }
-      const S then = mul_add(table.nodes[s], h, t);
+      for (std::size_t i = 0; i < n; ++i) there.motors[i] = gp(center.motors[i], way_[s][i]);
+      const S then = mul_add(table.nodes[s], h_, t);
       const auto now = gradient(system, there, then);
       if constexpr (PoweredSystem<System>) power_[s] = system.power(there, then);
-      if constexpr (System::has_forque) forques[s] = now.forques;
       for (std::size_t i = 0; i < n; ++i) {
-        const Rate change = now.rates[i] - body_rate(s, i);
-        rates[s][i] = rates_[s][i] + change;
-        rate_changes[s][i] = change;
-        add_sizes(change, momenta_[s][i], changed);
-        add_sizes(rates[s][i], momenta_[s][i], size);
+        difference[s].rates[i] = now.rates[i] - gradients_[s].rates[i];
+        if constexpr (System::has_forque) {
+          difference[s].forques[i] = now.forques[i] - gradients_[s].forques[i];
+        }
       }
     }
-    rates_ = rates;
-    place(h);
-    for (std::size_t i = 0; i < n; ++i) {
-      const Momentum first = Ad_star(half_[i], state.momenta[i]);
-      last_[i] = first;
-      std::array<Momentum, stages> w{};
-      for (std::size_t s = 0; s < stages; ++s) {
-        if constexpr (stages > 1) {
-          w[s] = detail::dexp_gradient(xi_[s][i], rates_[s][i], momenta_[s][i]);
-        }
-        if constexpr (System::has_forque) {
-          Momentum force = forques[s][i];
-          if constexpr (stages > 1) {
-            w[s] = w[s] - detail::dexp_transpose(xi_[s][i], force);
-            force = Ad_star_inverse(way_[s][i], force);
-          }
-          last_[i] = mul_add(-h * table.weights[s], force, last_[i]);
+    return difference;
+  }
+
+  /// Iterates the stages; false where they do not settle.
+  [[nodiscard]] constexpr bool solve(const System& system, const StateOf<System>& state,
+                                     const S& t) noexcept {
+    const auto guess = gradients_;
+    S before(0);
+    int since = 0;  // iterations in this way
+    for (iterations_ = 1; iterations_ <= most_iterations; ++iterations_) {
+      Slopes by = residual(system, state, t);
+      if constexpr (has_newton) {
+        if (newton_.on) {
+          if (newton_.h != h_) linearise(system, state, t);
+          by = corrected(by);
         }
       }
-      const Momentum ends = S(0.5) * (detail::dexp_transpose(half_way_[i], first) +
-                                      detail::dexp_transpose(S(-1) * half_way_[i], last_[i]));
-      for (std::size_t s = 0; s < stages; ++s) {
-        Momentum p = ends;
-        if constexpr (stages > 1) {
-          for (std::size_t r = 0; r < stages; ++r) p = mul_add(h * table.odd[s][r], w[r], p);
-          p = p - detail::dexp_transpose(xi_[s][i], momenta_[s][i]);
-        } else {
-          p = p - momenta_[s][i];
+      const S change = size(by);
+      // Where polynomials foretell nothing, as of stiff springs, the next step starts without them.
+      if (iterations_ == 1) foresees_ = change < S(0.05);
+      ++since;
+      const bool finite = change - change == S(0);
+      const bool small = change <= S(65536) * scalar::Limits<S>::epsilon();
+      const bool slow = since > 2 && change > S(0.25) * before;
+      if (!finite || (slow && !small)) {
+        if constexpr (has_newton) {
+          if (!finite || (!newton_.on && change > S(0.1))) {
+            if (newton_.on && since == 1) return false;
+            gradients_ = guess;
+            begin(state);
+          }
+          newton_.on = true;
+          linearise(system, state, t);
+          since = 0;
+          continue;
+        } else if (!finite) {
+          return false;
         }
-        momenta_[s][i] = momenta_[s][i] + p;
-        add_sizes(rates_[s][i], p, changed);
-        add_sizes(rate_changes[s][i], p, both);
+      }
+      for (std::size_t s = 0; s < stages; ++s) {
+        for (std::size_t i = 0; i < n; ++i) {
+          gradients_[s].rates[i] = gradients_[s].rates[i] + by[s].rates[i];
+          if constexpr (System::has_forque) {
+            gradients_[s].forques[i] = gradients_[s].forques[i] + by[s].forques[i];
+          }
+        }
+      }
+      place(state);
+      // Rounding is reached where small changes shrink no more; the first two need not show all
+      // components.
+      if (since > 2 && small && (change <= S(0) || !(change < before))) return true;
+      before = change;
+    }
+    return false;
+  }
+
+  /// The size of a change of rates and forques, relative to Σ |μ B|.
+  [[nodiscard]] constexpr S size(const Slopes& by) const noexcept {
+    S changed(0);
+    S whole(0);
+    S both(0);
+    for (std::size_t s = 0; s < stages; ++s) {
+      for (std::size_t i = 0; i < n; ++i) {
+        add_sizes(by[s].rates[i], momenta_[s][i], changed);
+        add_sizes(gradients_[s].rates[i], momenta_[s][i], whole);
+        if constexpr (System::has_forque) {
+          const Momentum push = h_ * by[s].forques[i];
+          add_sizes(gradients_[s].rates[i], push, changed);
+          add_sizes(by[s].rates[i], push, both);
+        }
       }
     }
     // The root sees a small component beside a large one, as a spin, to first order.
-    return select(size > S(0), changed / size + scalar::sqrt(both / size), changed + both);
-  }
-
-  /// The rate of body i at stage s.
-  [[nodiscard]] constexpr Rate body_rate(std::size_t s, std::size_t i) const noexcept {
-    if constexpr (stages > 1) {
-      return detail::dexp_of(xi_[s][i], rates_[s][i]);
-    } else {
-      return rates_[s][i];
-    }
+    return select(whole > S(0), changed / whole + scalar::sqrt(both / whole), changed + both);
   }
 
   /// Adds Σ |V_k μ_k|.
@@ -337,18 +408,133 @@ class Gauss {
     for (std::size_t k = 0; k < x.size(); ++k) sum = sum + scalar::abs(x[k] * y[k]);
   }
 
-  std::array<std::array<Rate, n>, stages> rates_{};        ///< V: ξ̇ at the stages
-  std::array<std::array<Momentum, n>, stages> momenta_{};  ///< μ at the stages
+  /// Newton's change of rates and forques for a difference of them.
+  [[nodiscard]] constexpr Slopes corrected(const Slopes& difference) const noexcept {
+    typename detail::StageEquations<S, stages, unknowns>::Slopes r{};
+    for (std::size_t s = 0; s < stages; ++s) r[s] = numbers(difference[s]);
+    r = newton_.equations.solve(table, r);
+    Slopes by{};
+    for (std::size_t s = 0; s < stages; ++s) {
+      for (std::size_t i = 0; i < n; ++i) {
+        std::array<S, dimension> rate{};
+        std::array<S, dimension> forque{};
+        for (std::size_t k = 0; k < dimension; ++k) {
+          rate[k] = r[s][i * dimension + k];
+          forque[k] = -r[s][(n + i) * dimension + k];
+        }
+        by[s].rates[i] = Rate::from(rate);
+        by[s].forques[i] = Momentum::from(forque);
+      }
+    }
+    return by;
+  }
+
+  /// B and −F, which displacements and pushes grow by.
+  [[nodiscard]] static constexpr Vector numbers(const Gradients& slope) noexcept {
+    Vector x{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto rate = slope.rates[i].components();
+      for (std::size_t k = 0; k < dimension; ++k) x[i * dimension + k] = rate[k];
+      if constexpr (System::has_forque) {
+        const auto forque = slope.forques[i].components();
+        for (std::size_t k = 0; k < dimension; ++k) x[(n + i) * dimension + k] = -forque[k];
+      }
+    }
+    return x;
+  }
+
+  /// The Jacobian of (B, −F) at the middle stage for displacements η and pushes φ that change its
+  /// motor to M exp η and its momentum to μ + ad*_η μ + φ, by differences of the gradient: Newton's
+  /// method asks no more of it than to be near.
+  constexpr void linearise(const System& system, const StateOf<System>& state,
+                           const S& t) noexcept {
+    constexpr std::size_t at = stages / 2;
+    StateOf<System> center = state;
+    for (std::size_t i = 0; i < n; ++i) {
+      center.motors[i] = gp(gp(state.motors[i], half_[i]), way_[at][i]);
+      center.momenta[i] = momenta_[at][i];
+    }
+    const S then = mul_add(table.nodes[at], h_, t);
+    const auto slope = gradient(system, center, then);
+    const Vector here = numbers(slope);
+    const S root = scalar::sqrt(scalar::Limits<S>::epsilon());
+    detail::Matrix<S, unknowns> jacobian{};
+    for (std::size_t i = 0; i < n; ++i) {
+      // Of what the step does not move, little is known.
+      const auto rate = slope.rates[i].components();
+      const S moved = scalar::abs(h_) * detail::largest(slope.rates[i]);
+      S pushed = detail::largest(center.momenta[i]);
+      if constexpr (System::has_forque) {
+        pushed = pushed + scalar::abs(h_) * detail::largest(slope.forques[i]);
+      }
+      for (std::size_t k = 0; k < dimension; ++k) {
+        const S step = root * (scalar::abs(h_ * rate[k]) + S(0.01) * moved +
+                               root * detail::largest(center.motors[i]));
+        std::array<S, dimension> unit{};
+        unit[k] = step;
+        const Rate eta = Rate::from(unit);
+        StateOf<System> there = center;
+        there.motors[i] = center.motors[i] + detail::motor_change(center.motors[i], eta);
+        there.momenta[i] = center.momenta[i] + coadjoint(eta, center.momenta[i]);
+        fill(jacobian, i * dimension + k, here, numbers(gradient(system, there, then)), step);
+        if (!(pushed > S(0))) continue;
+        unit[k] = root * pushed;
+        there = center;
+        there.momenta[i] = center.momenta[i] + Momentum::from(unit);
+        fill(jacobian, (n + i) * dimension + k, here, numbers(gradient(system, there, then)),
+             unit[k]);
+      }
+    }
+    newton_.h = h_;
+    newton_.equations.set(jacobian, h_);
+  }
+
+  static constexpr void fill(detail::Matrix<S, unknowns>& jacobian, std::size_t column,
+                             const Vector& here, const Vector& there, const S& step) noexcept {
+    for (std::size_t row = 0; row < unknowns; ++row) {
+      jacobian[row][column] = (there[row] - here[row]) / step;
+    }
+  }
+
+  /// Moves the state; what it loses in each step is kept.
+  constexpr void finish(StateOf<System>& state) noexcept {
+    ChangeOf<System> change{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Rate x = S(2) * half_way_[i];
+      change.motors[i] = detail::motor_change(state.motors[i], x);
+      change.momenta[i] =
+          detail::momentum_change(state.momenta[i], x) - Ad_star(half_[i], taken_[i]);
+    }
+    detail::record(drift_, low_.add(state, change));
+    if (failure_ != Failure::none) {
+      for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+    }
+    if constexpr (PoweredSystem<System>) {
+      for (std::size_t s = 0; s < stages; ++s) work_ = mul_add(step_weights_[s], power_[s], work_);
+    }
+    end_ = state;
+  }
+
+  std::array<Gradients, stages> gradients_{};        ///< B and F at the stages
+  std::array<Momenta, stages> momenta_{};            ///< μ there
+  std::array<Momenta, stages> beside_{};             ///< m there less the balance of the forques
+  Momenta taken_{};                                  ///< h Σ b Ad*⁻¹ F, seen from half-way
+  std::array<std::array<Rate, n>, stages> rates_{};  ///< V = ξ̇ there
   std::array<std::array<Rate, n>, stages> xi_{};
   std::array<std::array<Element, n>, stages> way_{};  ///< exp ξ
   std::array<Rate, n> half_way_{};                    ///< X/2
   std::array<Element, n> half_{};                     ///< exp(X/2)
-  std::array<Momentum, n> last_{};                    ///< μ₁, seen from half-way
+  std::array<S, stages> step_weights_{};              ///< h b
   std::array<S, stages> power_{};
+  S h_{};
+  StateOf<System> end_{};  ///< what the last step left
+  [[no_unique_address]] std::conditional_t<has_newton, Newton, NoNewton> newton_;
+  LowDigits<System> low_;
   Drift<S> drift_;
   S work_{};
   Failure failure_ = Failure::none;
   int iterations_ = 0;
+  bool foresees_ = false;
 };
 
 /// The midpoint rule on the group, order 2: M₁ = M₀ exp(h B), B and F half-way.
@@ -360,5 +546,9 @@ template <HamiltonianSystem System>
 using Gauss6 = Gauss<System, 3>;
 template <HamiltonianSystem System>
 using Gauss8 = Gauss<System, 4>;
+template <HamiltonianSystem System>
+using Gauss12 = Gauss<System, 6>;
+template <HamiltonianSystem System>
+using Gauss16 = Gauss<System, 8>;
 
 }  // namespace hamotor

@@ -20,7 +20,7 @@ template <class System>
 struct Steppers {
   using type = std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
                           CommutatorFree4<System>, Rk4<System>, LieMidpoint<System>, Gauss4<System>,
-                          Gauss6<System>, Gauss8<System>>;
+                          Gauss6<System>, Gauss8<System>, Gauss12<System>, Gauss16<System>>;
 };
 template <SplitSystem System>
 struct Steppers<System> {
@@ -28,7 +28,7 @@ struct Steppers<System> {
       std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
                  CommutatorFree4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
                  Splitting6<System>, Splitting8<System>, Splitting10<System>, LieMidpoint<System>,
-                 Gauss4<System>, Gauss6<System>, Gauss8<System>>;
+                 Gauss4<System>, Gauss6<System>, Gauss8<System>, Gauss12<System>, Gauss16<System>>;
 };
 
 template <class System>
