@@ -218,3 +218,11 @@ def test_bundled_scenes_stay_near_in_float(name: str) -> None:
         for part in ("motor", "momentum"):
             a, b = (np.array([*run.final[body][part].values()]) for run in (one, other))
             assert np.abs(a - b).max() <= 1e-3 * max(1e-3, np.abs(b).max())
+
+
+@pytest.mark.parametrize("method", ["splitting2", "taylor"])
+def test_a_box_has_exact_moments_in_the_source(method: str) -> None:
+    """m (a² + b²)/12 of tenths are short fractions; one rounded to a double is not."""
+    text = scene_source(read_scene("tumble"), scalar="quad", method=method)
+    assert "scalar::number<S>(" not in text
+    assert "S(240)" in text or "/ S(120)" in text

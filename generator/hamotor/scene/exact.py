@@ -63,12 +63,14 @@ def rounded_once(*products: tuple[float, ...]) -> float:
 
 
 def with_digits(function: Callable[..., Any], *numbers: Fraction) -> tuple[Fraction, ...]:
-    """What a function of mpmath's numbers gives for these, to `DIGITS`."""
+    """What a function of mpmath's numbers gives for these, to `DIGITS` of the largest."""
     import mpmath
 
     with mpmath.workdps(DIGITS + 10):
         found = function(*(mpmath.mpf(x.numerator) / x.denominator for x in numbers))
-        return tuple(map(from_mpmath, found if isinstance(found, tuple | list) else (found,)))
+        several = found if isinstance(found, tuple | list) else (found,)
+        noise = max(map(abs, several)) * mpmath.mpf(10) ** -(DIGITS + 5)
+        return tuple(from_mpmath(x) if abs(x) > noise else Fraction(0) for x in several)
 
 
 def from_mpmath(x: Any) -> Fraction:
@@ -90,6 +92,12 @@ def unit_vector(numbers: Iterable[Fraction]) -> tuple[Fraction, ...]:
         return kept
     (norm,) = with_digits(lambda x: x**0.5, square)
     return tuple(x / norm for x in kept)
+
+
+def short(x: float | Fraction) -> Fraction:
+    """The number that x stands for; in `DIGITS` where its fraction is longer."""
+    exact = x if isinstance(x, Fraction) else decimal(x)
+    return exact if exact.denominator < 10**DIGITS else Fraction(text(exact))
 
 
 def text(x: float | Fraction) -> str:

@@ -11,6 +11,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -55,16 +56,21 @@ class PrincipalFrame:
         """The principal axes, as columns in the user's body frame."""
         return rotation_matrix(self.rotor)
 
+    @cached_property
+    def exact_axes(self) -> tuple[tuple[Fraction, ...], ...]:
+        """The same, as the numbers that these stand for."""
+        return tuple(map(tuple, rotation_matrix([decimal(x) for x in self.rotor])))
+
     def from_body_frame(self, point: Sequence[float]) -> Vector:
         """A point of the user's body frame, in the principal frame."""
         if self.is_body_frame:
             return tuple(float(x) for x in point)
         relative = np.array(point, dtype=float) - np.array(self.center)
         exact = [decimal(x) - decimal(c) for x, c in zip(point, self.center, strict=True)]
-        axes = rotation_matrix([decimal(x) for x in self.rotor])
+        columns = zip(*self.exact_axes, strict=True)
         return tuple(
             exactly(float(x), sum((a * y for a, y in zip(axis, exact, strict=True)), Fraction(0)))
-            for x, axis in zip(self.axes.T @ relative, axes.T, strict=True)
+            for x, axis in zip(self.axes.T @ relative, columns, strict=True)
         )
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
 
 import sympy
 
@@ -10,7 +11,7 @@ from hamotor.mechanics import interactions
 from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.hamiltonian import Hamiltonian
 from hamotor.mechanics.system import System
-from hamotor.scene.exact import decimal
+from hamotor.scene.exact import rounded, short
 from hamotor.scene.model import Body, Scene
 
 
@@ -52,13 +53,13 @@ def principal_system(scene: Scene) -> System:
     return System(Hamiltonian(bodies, energy, parameters))
 
 
-def _number(x: float) -> Expr:
-    exact = decimal(x)
+def _number(x: float | Fraction) -> Expr:
+    exact = short(x)
     return sympy.Rational(exact.numerator, exact.denominator)
 
 
-def _numbers(values: Sequence[float]) -> tuple[Expr, ...]:
-    return tuple(_number(float(x)) for x in values)
+def _numbers(values: Iterable[float | Fraction]) -> tuple[Expr, ...]:
+    return tuple(map(_number, values))
 
 
 def _seen(body: Body, point: Sequence[float]) -> tuple[Expr, ...]:
@@ -78,7 +79,7 @@ def _places(body: Body, user: Coordinates, c: Coordinates, held: set[Expr]) -> d
 
     X_user = A X + c, so that R_user = R Aᵀ and M_user = M N~.
     """
-    axes = [_numbers(row) for row in body.principal.axes]
+    axes = [_numbers(row) for row in body.principal.exact_axes]
     found: dict[Expr, Expr] = {}
     d = range(c.dimension)
     for j in d:
@@ -86,7 +87,7 @@ def _places(body: Body, user: Coordinates, c: Coordinates, held: set[Expr]) -> d
             if user.rotation[j][k] in held:
                 found[user.rotation[j][k]] = sympy.Add(*(c.rotation[j][n] * axes[k][n] for n in d))
     for point in user.points_in(held):
-        at = _seen(body, [float(x) for x in point.place])
+        at = _seen(body, [rounded(Fraction(int(x.p), int(x.q))) for x in point.place])
         found |= dict(zip(point.symbols, c.at(at), strict=True))
     if held & set(user.motor):
         back = _motor_back(body, c)
