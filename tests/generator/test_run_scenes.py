@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import hamotor
-from hamotor.run.simulation import choose_method
+from hamotor.run.choice import choose_method
 from hamotor.scene import METHODS, Form, bundled_scenes, methods_offered
 
 SCENES = [name for name, _ in bundled_scenes()]
@@ -199,9 +199,10 @@ def test_gauss_collocation_runs_every_form_of_a_scene(name: str) -> None:
 
 
 def test_stages_that_do_not_converge_stop_the_run() -> None:
-    with pytest.raises(hamotor.RunFailed, match="finite") as caught:
+    with pytest.raises(hamotor.RunFailed, match="gauss4 did not converge in step") as caught:
         hamotor.load("heavy_top").run(method="gauss4", step=2.5)
     assert caught.value.run.status == "failed"
+    assert caught.value.run.report["failure"]["reason"] == "no_convergence"
 
 
 def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:

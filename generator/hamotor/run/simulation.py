@@ -16,6 +16,7 @@ import numpy as np
 
 from hamotor.errors import UsageError, suggest
 from hamotor.run.build import CompiledScene, compile_scene, default_cache, eigen
+from hamotor.run.choice import choose_method
 from hamotor.run.dataset import DiskRecorder, MemoryRecorder, RunFolder
 from hamotor.run.library import Description, SceneLibrary, Vector, check_method
 from hamotor.run.progress import NoProgress, PrintedProgress, Progress
@@ -32,14 +33,8 @@ if TYPE_CHECKING:
 KERNELS = ("generated", "generic")
 REPRESENTATIONS = ("ga", "matrix")
 
-_AUTO_METHOD = "splitting2"
-_AUTO_REASON = (
-    "it keeps every coadjoint orbit exactly and its energy error does not grow over long runs"
-)
-_FALLBACK_METHOD = "rkmk4"
 _ROWS = 1000
 _MOST_TIMES = 10_000_000
-_SMALL_TOLERANCE = 1e-7  # a heavy top's 1e-9 takes order 2 four times as long as order 4
 
 
 @dataclass(frozen=True)
@@ -68,6 +63,8 @@ class Simulation:
     matrix_source: Callable[[str], str] | None = None
     """Gives the C++ text in the matrix representation, for a scalar."""
     has_events: bool = False
+    structure: str = ""
+    """Its class of `hamotor.scene.structure`, for the choice of a method."""
     exact_digits: tuple[str, ...] = ()
     """The initial state in 60 digits."""
 
@@ -224,7 +221,7 @@ class Simulation:
         reason = ""
         if methods:
             # Before the compiler runs: a slip of the pen should not take seconds to come back.
-            chosen, reason = choose_method(chosen, methods, tolerance)
+            chosen, reason = choose_method(chosen, methods, tolerance, self.structure)
         folder = None if out is None else RunFolder(out)
         shown = _progress(progress)
         compiled = self.compile(
@@ -237,7 +234,7 @@ class Simulation:
         description = compiled.library.description
         method = chosen
         if not methods:
-            method, reason = choose_method(chosen, description.methods, tolerance)
+            method, reason = choose_method(chosen, description.methods, tolerance, self.structure)
         if local_tolerance is not None and method not in description.error_controlled:
             raise UsageError(
                 f"{method} does not choose its steps, so it has no local tolerance; "
@@ -357,23 +354,6 @@ class Compiled:
         return self.library.description
 
 
-def choose_method(
-    asked: str, methods: Mapping[str, int], tolerance: float | None = None
-) -> tuple[str, str]:
-    """The method to use, and why if the choice was ours (`auto`).  UsageError if unknown."""
-    if asked != "auto":
-        check_method(asked, {**methods, "auto": 0})
-        return asked, ""
-    if tolerance is not None and tolerance < _SMALL_TOLERANCE and _FALLBACK_METHOD in methods:
-        return _FALLBACK_METHOD, f"order 4 meets a tolerance below {_SMALL_TOLERANCE:g} sooner"
-    if _AUTO_METHOD in methods:
-        return _AUTO_METHOD, _AUTO_REASON
-    if _FALLBACK_METHOD in methods:
-        return _FALLBACK_METHOD, f"this scene has no {_AUTO_METHOD}"
-    only = next(iter(methods))
-    return only, "it is what this scene offers"
-
-
 def load(scene: str | os.PathLike[str]) -> Simulation:
     """A bundled scene by name, or a scene file by path.
 
@@ -389,6 +369,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         scene_source,
     )
     from hamotor.scene.exact import text
+    from hamotor.scene.structure import structure_of
 
     contents, name, file = find_scene(Path(scene) if isinstance(scene, os.PathLike) else scene)
     kept = Remembered(default_cache(), key_of(contents, name, folder_of(scene)))
@@ -412,6 +393,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "interval": found.output.interval,
             "has_events": bool(found.events),
             "spec_hash": found.sha256,
+            "structure": structure_of(found),
             "methods": methods_offered(found.form if isinstance(found, Scene) else Form.GENERAL),
         }
 
@@ -443,6 +425,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
     from hamotor.scene.building import general_scene
     from hamotor.scene.exact import text
     from hamotor.scene.matrix_source import matrix_source
+    from hamotor.scene.structure import structure_of
 
     scene = general_scene(energy, bodies, **settings)
     return Simulation(
@@ -457,6 +440,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
         every=scene.output.every,
         spec_hash=scene.sha256,
         methods=methods_offered(Form.GENERAL),
+        structure=structure_of(scene),
         read=lambda: scene,
         matrix_source=lambda scalar: matrix_source(scene, scalar),
     )

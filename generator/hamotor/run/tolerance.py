@@ -39,6 +39,7 @@ _FIRST_TURN = 0.25  # a first guess turns the motor by at most a quarter of a ra
 _CONSTANT = 100.0  # a step's error is thought to be (turn in the step)^(order + 1) over this
 _AIM = 0.3  # of the tolerance: a guess by the order should not fail by a little
 _LARGEST_LEAP = 1024.0
+_ORDER_OF_EXACT = 16  # whatever: its runs agree at once
 _OFF_ORDER = 30.0
 _REACHABLE = 1e-13  # what lies below is asked of rounding, not of a method
 _CAUTION = (
@@ -122,7 +123,7 @@ class _Climb:
         self.method, self.end, self.target = method, end, tolerance
         self.every, self.times = every, times
         self.controlled = method in description.error_controlled
-        order = description.methods[method]
+        order = description.methods[method] or _ORDER_OF_EXACT
         self.order = 1.0 if self.controlled else float(order)
         self.check = 16.0 if self.controlled else 2.0
         if self.controlled:
