@@ -133,6 +133,17 @@ TEST(MoserVeselov, keeps_spatial_momentum_and_energy) {
   EXPECT_LT(distance(spatial_momentum(end), spatial_momentum(begin)), 1e-12);
 }
 
+TEST(MoserVeselov, keeps_the_digits_of_a_needles_spin) {
+  const hamotor::RigidBodies system{std::tuple{
+      hamotor::PivotedBody<sample::SO3, double>(1, {1, 1.000000005, 1e-8}, {0, 0, 0}, {0, 0, 0})}};
+  using System = Of<decltype(system)>;
+  System::State start{};
+  start.motors[0].s = 1;
+  start.momenta[0] = {1, 0.5, 2e-8};
+  const auto there = stepped<MoserVeselov<System, 2>>(system, start, 0.02, 1000);
+  EXPECT_LT(distance(stepped<MoserVeselov<System, 2>>(system, there, -0.02, 1000), start), 1e-13);
+}
+
 TEST(MoserVeselov, starts_anew_where_the_state_was_changed) {
   const auto system = sample::free_so3();
   using Method = MoserVeselov<Of<decltype(system)>, 10>;

@@ -147,12 +147,13 @@ class Rotation {
     }
   }
 
-  /// The rotation of a step of h; whether there is one.
+  /// The rotation of a step of h and what it adds to Π; whether there is one.
   ///
   /// With e = v/w of its rotor w + v it solves (1 + |e|²) h Π/2 = J e + e × J e, by Newton's method
   /// from where the last steps point to.
   [[nodiscard]] constexpr bool step(const std::array<S, 3>& angular, const S& h,
-                                    RotorIncrement<S, 3>& rotor) noexcept {
+                                    RotorIncrement<S, 3>& rotor,
+                                    std::array<S, 3>& change) noexcept {
     const S half = S(0.5) * h;
     const std::array<S, 3> a{half * angular[0], half * angular[1], half * angular[2]};
     const auto& [j1, j2, j3] = moments_;
@@ -203,6 +204,10 @@ class Rotation {
     const S root = scalar::sqrt(S(1) + square);
     const S w = S(1) / root;
     rotor = {-square * w / (S(1) + root), {w * x, w * y, w * z}};
+    // Π turned back by the rotor, Π − (4/h) w² e × J e: by component, so that a momentum about an
+    // axis of little inertia keeps its digits beside larger ones.
+    const S by = S(-4) * w * w / h;
+    change = {by * (d1 * (y * z)), by * (d2 * (z * x)), by * (d3 * (x * y))};
     return found;
   }
 
@@ -273,8 +278,8 @@ class FreelyStepped {
         const auto mu = momenta[i].components();
         const auto angular = first<rotations>(mu);
         RotorIncrement<Scalar, rotations> rotor{};
-        found_ = rotations_[i].step(angular, h, rotor) && found_;
-        const auto turned = turned_back_change(rotor, angular);
+        std::array<Scalar, rotations> turned{};
+        found_ = rotations_[i].step(angular, h, rotor, turned) && found_;
         if constexpr (Space<Group>::translates) {
           const auto p = rest<rotations>(mu);
           auto way = p;
