@@ -237,6 +237,27 @@ class Program:
         return {name: _evaluate(e, known, functions) for name, e in self.outputs}
 
 
+def renamed(program: Program, names: Mapping[str, str]) -> Program:
+    """The same program with other names for what it reads and gives."""
+
+    def other(x: Expression) -> Expression:
+        match x:
+            case Name(text):
+                return Name(names.get(text, text))
+            case Number():
+                return x
+            case Call(function, arguments):
+                return Call(function, tuple(map(other, arguments)))
+            case _:
+                return type(x)(*map(other, children(x)))
+
+    return replace(
+        program,
+        bindings=tuple((name, other(x)) for name, x in program.bindings),
+        outputs=tuple((names.get(name, name), other(x)) for name, x in program.outputs),
+    )
+
+
 def walk(expression: Expression) -> Iterator[Expression]:
     """The expression and everything below it, in the order of reading."""
     rest = [expression]

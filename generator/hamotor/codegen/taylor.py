@@ -733,3 +733,131 @@ def _power_expression(x: Expression, exponent: Fraction) -> Expression:
     for factor in factors[1:]:
         value = Product(value, factor)
     return Quotient(Number(1), value) if exponent < 0 else value
+
+
+# ---------------------------------------------------------------- eight lanes
+
+
+PACK = 8
+"""Lanes of a pack."""
+MOST_PACKS, MOST_PRODUCTS = 2, 12
+"""Of coordinates, and of the packs of products: what registers hold."""
+
+
+@dataclass(frozen=True)
+class PackedTerm:
+    """Eight terms weight · x[left] · x[right], added to eight derivatives; linear ones have no
+    left."""
+
+    pack: int
+    left: tuple[int, ...]
+    right: tuple[int, ...]
+    weights: tuple[Fraction, ...]
+
+
+@dataclass(frozen=True)
+class Quadratic:
+    """ẋ = c + L x + Q(x, x) for variables in an order in which packs of derivatives are alike.
+
+    order: the variables' places in the recurrence. products: of two functions of time; fixed: of
+    one that is constant, on the left.
+    """
+
+    order: tuple[int, ...]
+    products: tuple[PackedTerm, ...]
+    fixed: tuple[PackedTerm, ...]
+    linear: tuple[PackedTerm, ...]
+    constants: tuple[Fraction, ...]
+
+    @property
+    def packs(self) -> int:
+        """Of variables."""
+        return -(-len(self.order) // PACK)
+
+
+def quadratic(r: Recurrence) -> Quadratic | None:
+    """The field as a quadratic one; None where it is none, or has too many terms for packs."""
+    if len(r.derivatives) > MOST_PACKS * PACK:
+        return None
+    places = {r.variables[name]: i for i, (name, _) in enumerate(r.derivatives)}
+    values: dict[int, _Quadratic] = {ONE: {(): Fraction(1)}}
+    for i, node in enumerate(r.nodes):
+        value = _as_quadratic(node, i, places, values)
+        if value is None:
+            return None
+        values[i] = value
+    fields = [_combined(form.items(), values) for _, form in r.derivatives]
+    constant = {places[n] for n in r.constants if n in places}
+
+    def varying(field: _Quadratic) -> int:
+        return sum(len(m) == 2 and not constant & set(m) for m in field)
+
+    order = sorted(range(len(fields)), key=lambda i: -varying(fields[i]))
+    new = {old: i for i, old in enumerate(order)}
+    rows: dict[str, list[list[tuple[Fraction, int, int]]]] = {
+        kind: [[] for _ in order] for kind in ("products", "fixed", "linear")
+    }
+    constants = [Fraction(0)] * len(order)
+    for old, field in enumerate(fields):
+        for monomial, x in sorted(field.items()):
+            at = new[old]
+            if not monomial:
+                constants[at] = x
+            elif len(monomial) == 1:
+                rows["linear"][at].append((x, 0, new[monomial[0]]))
+            else:
+                a, b = sorted(monomial, key=lambda i: i not in constant)
+                kind = "fixed" if a in constant else "products"
+                rows[kind][at].append((x, new[a], new[b]))
+    terms = {kind: _packed(table) for kind, table in rows.items()}
+    if len(terms["products"]) > MOST_PRODUCTS or len(terms["linear"]) > MOST_PRODUCTS:
+        return None
+    return Quadratic(
+        tuple(order), terms["products"], terms["fixed"], terms["linear"], tuple(constants)
+    )
+
+
+_Quadratic = dict[tuple[int, ...], Fraction]
+"""Places of variables, sorted → coefficient; of degree two at most."""
+
+
+def _as_quadratic(
+    node: Node, own: int, places: Mapping[int, int], values: Mapping[int, _Quadratic]
+) -> _Quadratic | None:
+    match node:
+        case Given(name):
+            return {(places[own],): Fraction(1)} if name else {(): Fraction(1)}
+        case Combination(terms):
+            return _combined(terms, values)
+        case Times(a, b):
+            product: _Quadratic = {}
+            for one, x in values[a].items():
+                for other, y in values[b].items():
+                    monomial = tuple(sorted((*one, *other)))
+                    product[monomial] = product.get(monomial, Fraction(0)) + x * y
+            return product if max(map(len, product), default=0) <= 2 else None
+        case _:
+            return None
+
+
+def _combined(
+    terms: Iterable[tuple[int, Fraction]], values: Mapping[int, _Quadratic]
+) -> _Quadratic:
+    total: _Quadratic = {}
+    for node, x in terms:
+        for monomial, y in values[node].items():
+            total[monomial] = total.get(monomial, Fraction(0)) + x * y
+    return {monomial: x for monomial, x in total.items() if x}
+
+
+def _packed(rows: list[list[tuple[Fraction, int, int]]]) -> tuple[PackedTerm, ...]:
+    """The n-th terms of eight derivatives side by side, for every n."""
+    found = []
+    for pack in range(-(-len(rows) // PACK)):
+        lanes = [*rows[PACK * pack : PACK * (pack + 1)]]
+        lanes += [[]] * (PACK - len(lanes))
+        for n in range(max(map(len, lanes))):
+            terms = [lane[n] if n < len(lane) else (Fraction(0), 0, 0) for lane in lanes]
+            weights, left, right = zip(*terms, strict=True)
+            found.append(PackedTerm(pack, left, right, weights))
+    return tuple(found)

@@ -13,7 +13,7 @@ import sympy
 
 from hamotor.codegen.algebra import Blade, Rational
 from hamotor.codegen.program import Program
-from hamotor.codegen.taylor import Recurrence, recurrence
+from hamotor.codegen.taylor import PACK, Quadratic, Recurrence, quadratic, recurrence
 from hamotor.mechanics.body_frame import BodyFrame, Rewriting, Unsuitable
 from hamotor.mechanics.coordinates import Coordinates, Expr
 from hamotor.mechanics.hamiltonian import TIME, coadjoint
@@ -50,10 +50,19 @@ class Flow:
         return tuple(name for name, _ in self.field.outputs)
 
 
-def cheapest(system: System) -> tuple[Flow, Recurrence]:
-    """The flow whose recurrence has the fewest products, and that recurrence."""
-    pairs = [(flow, recurrence(flow.field)) for flow in flows(system)]
-    return min(pairs, key=lambda pair: len(pair[1].lanes))
+def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
+    """The flow whose recurrence is the least work, that recurrence, and its field if quadratic."""
+    found = []
+    for flow in flows(system):
+        r = recurrence(flow.field)
+        found.append((flow, r, quadratic(r)))
+
+    def work(choice: tuple[Flow, Recurrence, Quadratic | None]) -> int:
+        # A node of its own costs more than its sum; packs of a quadratic field have none.
+        _, r, packed = choice
+        return PACK * len(packed.products) if packed else 3 * len(r.lanes)
+
+    return min(found, key=work)
 
 
 def flows(system: System) -> list[Flow]:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from hamotor.codegen import cpp
-from hamotor.codegen.program import Program
-from hamotor.codegen.taylor import NotAnalytic, steps
+from hamotor.codegen.program import Program, renamed
+from hamotor.codegen.taylor import PACK, NotAnalytic, PackedTerm, Quadratic, steps
 from hamotor.errors import UsageError
 from hamotor.mechanics.flow import WORK, cheapest
 from hamotor.mechanics.system import System
@@ -33,39 +34,75 @@ def refusal(scene: str, reason: str) -> UsageError:
 
 def recurrence_text(system: System, *, by_name: bool) -> str:
     """The same; NotAnalytic where the motion has no Taylor series everywhere."""
-    flow, expansion = cheapest(system)
-    programs = steps(expansion)
-    h = system.hamiltonian
+    flow, expansion, packed = cheapest(system)
+    order = packed.order if packed else tuple(range(len(flow.coordinates)))
+    # Where packs want them; `x[i]` is renamed everywhere.
+    places = {f"x[{old}]": f"x[{new}]" for new, old in enumerate(order)}
+    names = [flow.coordinates[old] for old in order]
+    programs = steps(
+        replace(expansion, derivatives=tuple(expansion.derivatives[old] for old in order))
+    )
+    leave = renamed(flow.leave, places)
     bodies = []
-    for k, body in enumerate(h.bodies):
+    for k, body in enumerate(system.hamiltonian.bodies):
         motor = [f"m{k}.{c.name}" for c in body.group.element.components]
         momentum = [f"mu{k}.{g.momentum}" for g in body.group.generators]
         bodies.append(
             {
-                "motor": [_output(flow.leave, name) for name in motor],
-                "momentum": [_output(flow.leave, name) for name in momentum],
-                "coordinates": [
-                    flow.coordinates.index(name) if name in flow.coordinates else None
-                    for name in motor
-                ],
+                "motor": [_output(leave, name) for name in motor],
+                "momentum": [_output(leave, name) for name in momentum],
+                "coordinates": [names.index(name) if name in names else None for name in motor],
             }
         )
+    entered = dict(renamed(flow.enter, places).outputs)
+    coordinates = PACK * packed.packs if packed else len(names)
+    padding = coordinates - len(names)
     return rendered(
         "taylor.hpp.jinja",
         by_name=by_name,
         bodies=bodies,
-        coordinates=len(flow.coordinates),
-        parts=flow.parts,
-        independent=flow.independent,
-        refresh=_text(flow.refresh),
-        work=flow.coordinates.index(WORK) if WORK in flow.coordinates else None,
+        coordinates=coordinates,
+        parts=[*(flow.parts[old] for old in order), *[-1] * padding],
+        work=names.index(WORK) if WORK in names else None,
+        follows=["true" if old >= flow.independent else "false" for old in order]
+        + ["false"] * padding,
         lanes=len(expansion.lanes),
         known=programs.known,
-        enter=_text(flow.enter),
-        leave=_text(flow.leave),
+        enter=_text(
+            replace(
+                flow.enter,
+                outputs=tuple((f"x[{i}]", entered[f"x[{i}]"]) for i in range(len(names))),
+            )
+        ),
+        leave=_text(leave),
+        refresh=_text(renamed(flow.refresh, places)),
         first=_text(programs.first),
         next=_text(programs.next),
+        packed=_packed(packed, padding) if packed else None,
     )
+
+
+def _packed(field: Quadratic, padding: int) -> dict[str, Any]:
+    """A quadratic field as tables."""
+
+    def table(terms: tuple[PackedTerm, ...]) -> list[dict[str, Any]]:
+        return [
+            {
+                "pack": t.pack,
+                "left": t.left,
+                "right": t.right,
+                "weights": [cpp.number_text(x) for x in t.weights],
+            }
+            for t in terms
+        ]
+
+    return {
+        "packs": field.packs,
+        "products": table(field.products),
+        "fixed": table(field.fixed),
+        "linear": table(field.linear),
+        "constants": [*map(cpp.number_text, field.constants), *["S(0)"] * padding],
+    }
 
 
 def _output(program: Program, name: str) -> str:

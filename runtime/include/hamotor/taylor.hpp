@@ -8,6 +8,7 @@
 #include <limits>
 #include <string_view>
 
+#include "hamotor/packed_series.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/state.hpp"
 #include "hamotor/steppers.hpp"
@@ -24,6 +25,27 @@ template <class System>
 concept AnalyticSystem = HamiltonianSystem<System> && requires {
   { RecurrenceOf<System>::coordinates } -> std::convertible_to<std::size_t>;
 };
+
+namespace detail {
+
+/// Whether a recurrence is that of a quadratic field and there are registers for it.
+template <class Recurrence, class S>
+inline constexpr bool is_packed = has_packs<S> && requires { typename Recurrence::Packed; };
+
+/// The factors of the sums of a recurrence, by order; or what does without them.
+template <class Recurrence, class S, std::size_t lanes, std::size_t orders>
+struct SeriesRows {
+  std::array<std::array<S, lanes>, orders> u{};
+  std::array<std::array<S, lanes>, orders> v{};
+};
+#ifdef HAMOTOR_PACKS
+template <class Recurrence, class S, std::size_t lanes, std::size_t orders>
+  requires is_packed<Recurrence, S>
+struct SeriesRows<Recurrence, S, lanes, orders>
+    : PackedSeries<typename Recurrence::Packed, S, orders> {};
+#endif
+
+}  // namespace detail
 
 /// The motion expanded in a Taylor series whose length and reach follow from a tolerance.
 ///
@@ -160,7 +182,7 @@ class Taylor {
     }
     Recurrence::replace_motors(x, motors);
     Recurrence::refresh(x);
-    for (std::size_t i = Recurrence::independent; i < n; ++i) low_[i] = S(0);
+    for (std::size_t i = 0; i < n; ++i) low_[i] = select(Recurrence::follows[i], S(0), low_[i]);
     detail::record(drift_, worst);
     expand();
   }
@@ -177,6 +199,15 @@ class Taylor {
 
   constexpr void expand() noexcept {
     ++steps_;
+    if constexpr (detail::is_packed<Recurrence, S>) {
+      rows_.expand(coefficients_, static_cast<std::size_t>(length_));
+      reach_ = reach_of_coefficients();
+    } else {
+      expand_node_by_node();
+    }
+  }
+
+  constexpr void expand_node_by_node() noexcept {
     typename Recurrence::Known known{};
     Coordinates change{};
     Row sums{};
@@ -186,7 +217,7 @@ class Taylor {
       add_products(k, sums);
       const S over = S(1) / S(static_cast<int>(k));
       Recurrence::next(S(static_cast<int>(k)), over, coefficients_[k], known, sums.data(),
-                       u_[k].data(), v_[k].data(), change);
+                       rows_.u[k].data(), rows_.v[k].data(), change);
       const S over_next = S(1) / S(static_cast<int>(k + 1));
       for (std::size_t i = 0; i < n; ++i) coefficients_[k + 1][i] = over_next * change[i];
     }
@@ -198,12 +229,12 @@ class Taylor {
     for (std::size_t first = 0; first < lanes; first += block) {
       std::array<S, block> sum{};
       for (std::size_t j = k / 2; j > 0; --j) {
-        const S* u = u_[j].data() + first;
-        const S* v = v_[k - j].data() + first;
+        const S* u = rows_.u[j].data() + first;
+        const S* v = rows_.v[k - j].data() + first;
         for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
         if (k - j == j) continue;
-        u = u_[k - j].data() + first;
-        v = v_[j].data() + first;
+        u = rows_.u[k - j].data() + first;
+        v = rows_.v[j].data() + first;
         for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
       }
       for (std::size_t l = 0; l < block; ++l) sums[first + l] = sum[l];
@@ -267,8 +298,7 @@ class Taylor {
   }
 
   std::array<Coordinates, static_cast<std::size_t>(order) + 1> coefficients_{};
-  std::array<Row, static_cast<std::size_t>(order) + 1> u_{};
-  std::array<Row, static_cast<std::size_t>(order) + 1> v_{};
+  detail::SeriesRows<Recurrence, S, lanes, static_cast<std::size_t>(order) + 1> rows_;
   Coordinates low_{};
   StateOf<System> delivered_{};
   S tolerance_ = scalar::Limits<S>::epsilon();
