@@ -18,10 +18,10 @@ namespace hamotor {
 /// Eight terms weight · x[left] · x[right] of the derivatives of one pack of coordinates.
 template <class S>
 struct PackedTerm {
-  std::size_t pack;
+  alignas(8 * sizeof(S)) std::array<S, 8> weights;
   std::array<int, 8> left;
   std::array<int, 8> right;
-  std::array<S, 8> weights;
+  std::size_t pack;
 };
 
 namespace detail {
@@ -76,38 +76,35 @@ class PackedSeries {
   using Coordinates = std::array<S, width>;
 
   /// Coefficients of orders 1 … p of the motion through x[0].
+  ///
+  /// Flat: rows that are passed to calls return through memory.
   template <std::size_t most>
-  void expand(std::array<Coordinates, most>& x, std::size_t p) noexcept {
+  [[gnu::flatten]] void expand(std::array<Coordinates, most>& x, std::size_t p) noexcept {
     X now{};
     for (std::size_t c = 0; c < packs; ++c) now[c] = load<S>(x[0].data() + 8 * c);
-    const Fixed fixed = fixed_factors(now);
-    const Rows u0 = left_factors(now);
-    const Rows v0 = right_factors(now);
     X change{};
     for (std::size_t c = 0; c < packs; ++c) change[c] = load<S>(Field::constants.data() + 8 * c);
+    at_0_.fixed = fixed_factors(now);
+    at_0_.u = left_factors(now);
+    at_0_.v = right_factors(now);
     each<products>([&](auto t) {
       V& sum = change[Field::products[t].pack];
-      sum = packed_mul_add(u0[t], v0[t], sum);
+      sum = packed_mul_add(at_0_.u[t], at_0_.v[t], sum);
+      at_0_.v[t] = load<S>(Field::products[t].weights.data()) * at_0_.v[t];
     });
-    add_linear(now, fixed, change);
-    for (std::size_t k = 1;; ++k) {
-      const S over = S(1) / S(static_cast<int>(k));
-      for (std::size_t c = 0; c < packs; ++c) {
-        now[c] = over * change[c];
-        store<S>(x[k].data() + 8 * c, now[c]);
-      }
+    add_linear(now, change);
+    for (std::size_t k = 1;; k += 2) {
+      put(k, change, now, x);
       if (k == p) return;
-      Rows sums = inner_sums(k);
-      const Rows u = left_factors(now);
-      const Rows v = right_factors(now);
-      each<products>([&](auto t) {
-        store<S>(u_[k].data() + 8 * t, u[t]);
-        store<S>(v_[k].data() + 8 * t, v[t]);
-        sums[t] = packed_mul_add(u0[t], v[t], packed_mul_add(u[t], v0[t], sums[t]));
-      });
-      change = X{};
-      add_linear(now, fixed, change);
-      each<products>([&](auto t) { change[Field::products[t].pack] += sums[t]; });
+      Rows sums{};
+      Rows later{};
+      if (k > 1) add_inner(k, sums, later);
+      change = derivatives(k, now, sums);
+      put(k + 1, change, now, x);
+      if (k + 1 == p) return;
+      add(1, k, later);
+      if (k > 1) add(k, 1, later);
+      change = derivatives(k + 1, now, later);
     }
   }
 
@@ -155,11 +152,11 @@ class PackedSeries {
     return result;
   }
 
-  HAMOTOR_INLINE static void add_linear(const X& x, const Fixed& fixed, X& change) noexcept {
+  HAMOTOR_INLINE void add_linear(const X& x, X& change) const noexcept {
     each<Field::fixed.size()>([&](auto t) {
       constexpr std::size_t i = decltype(t)::value;
       V& sum = change[Field::fixed[i].pack];
-      sum = packed_mul_add(fixed[i], taken<Field::fixed[i].right>(x), sum);
+      sum = packed_mul_add(at_0_.fixed[i], taken<Field::fixed[i].right>(x), sum);
     });
     each<Field::linear.size()>([&](auto t) {
       constexpr std::size_t i = decltype(t)::value;
@@ -169,32 +166,86 @@ class PackedSeries {
     });
   }
 
-  /// Σ u_j v_{k−j} over 0 < j < k, the newest coefficients last.
-  [[nodiscard]] HAMOTOR_INLINE Rows inner_sums(std::size_t k) const noexcept {
-    Rows rising{};
-    Rows falling{};
-    std::size_t j = k / 2;
-    if (k % 2 == 0 && j > 0) {
-      each<products>([&](auto t) {
-        rising[t] = load<S>(u_[j].data() + 8 * t) * load<S>(v_[j].data() + 8 * t);
-      });
-      --j;
+  /// Coefficients of order k from those of the derivatives.
+  template <std::size_t most>
+  HAMOTOR_INLINE static void put(std::size_t k, const X& change, X& now,
+                                 std::array<Coordinates, most>& x) noexcept {
+    for (std::size_t c = 0; c < packs; ++c) {
+      now[c] = reciprocals[k] * change[c];
+      store<S>(x[k].data() + 8 * c, now[c]);
     }
-    for (; j > 0; --j) {
-      const S* const u_low = u_[j].data();
-      const S* const v_low = v_[j].data();
-      const S* const u_high = u_[k - j].data();
-      const S* const v_high = v_[k - j].data();
-      each<products>([&](auto t) {
-        rising[t] = packed_mul_add(load<S>(u_low + 8 * t), load<S>(v_high + 8 * t), rising[t]);
-        falling[t] = packed_mul_add(load<S>(u_high + 8 * t), load<S>(v_low + 8 * t), falling[t]);
-      });
-    }
-    each<products>([&](auto t) { rising[t] += falling[t]; });
-    return rising;
   }
 
+  /// Coefficients of order k of the derivatives, from Σ u_j v_{k−j} over 0 < j < k; keeps u_k, v_k.
+  [[nodiscard]] HAMOTOR_INLINE X derivatives(std::size_t k, const X& now,
+                                             const Rows& sums) noexcept {
+    X change{};
+    X other{};
+    each<products>([&](auto t) { change[Field::products[t].pack] += sums[t]; });
+    add_linear(now, other);
+    each<products>([&](auto t) {
+      constexpr std::size_t i = decltype(t)::value;
+      const V left = taken<Field::products[i].left>(now);
+      const V right = taken<Field::products[i].right>(now);
+      V& one = change[Field::products[i].pack];
+      V& two = other[Field::products[i].pack];
+      one = packed_mul_add(at_0_.u[i], right, one);
+      two = packed_mul_add(left, at_0_.v[i], two);
+      store<S>(u_[k].data() + 8 * i, load<S>(Field::products[i].weights.data()) * left);
+      store<S>(v_[k].data() + 8 * i, right);
+    });
+    for (std::size_t c = 0; c < packs; ++c) change[c] += other[c];
+    return change;
+  }
+
+  /// Adds u_i v_j.
+  HAMOTOR_INLINE void add(std::size_t i, std::size_t j, Rows& sums) const noexcept {
+    each<products>([&](auto t) {
+      sums[t] =
+          packed_mul_add(load<S>(u_[i].data() + 8 * t), load<S>(v_[j].data() + 8 * t), sums[t]);
+    });
+  }
+
+  /// Σ u_j v_{k−j} over 0 < j < k for an odd k > 1, and for k + 1 what of it is known: two orders
+  /// in one pass, with half the loads.  The newest coefficients come last.
+  HAMOTOR_INLINE void add_inner(std::size_t k, Rows& sums, Rows& later) const noexcept {
+    if (k > 3) {
+      Rows v;
+      each<products>([&](auto t) { v[t] = load<S>(v_[k - 2].data() + 8 * t); });
+      add(2, k - 2, sums);
+      for (std::size_t j = 3; j + 2 <= k; ++j) {
+        const S* const u_row = u_[j].data();
+        const S* const v_row = v_[k - j].data();
+        each<products>([&](auto t) {
+          const V u = load<S>(u_row + 8 * t);
+          later[t] = packed_mul_add(u, v[t], later[t]);
+          v[t] = load<S>(v_row + 8 * t);
+          sums[t] = packed_mul_add(u, v[t], sums[t]);
+        });
+      }
+      add(k - 1, 2, later);
+    }
+    add(2, k - 1, later);
+    add(1, k - 1, sums);
+    add(k - 1, 1, sums);
+  }
+
+  /// 1/k.
+  static constexpr std::array<S, orders> reciprocals = [] {
+    std::array<S, orders> result{};
+    for (std::size_t k = 1; k < orders; ++k) result[k] = S(1) / S(static_cast<int>(k));
+    return result;
+  }();
+
+  /// Of order 0; v with the weights.
+  struct Start {
+    Rows u{};
+    Rows v{};
+    Fixed fixed{};
+  };
+
   using Stored = std::array<S, 8 * products>;
+  Start at_0_;
   alignas(64) std::array<Stored, orders> u_{};
   alignas(64) std::array<Stored, orders> v_{};
 };
