@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from hamotor.bench import bench_steps
+from hamotor.bench.steps import _one_a_family
 from hamotor.errors import UsageError
 
 
@@ -25,7 +26,16 @@ def test_forms_of_a_scene_differ_in_speed_and_agree_in_error(
     errors = [rows[form, "rkmk4"]["errors"]["position (m)"] for form in forms]
     assert errors == pytest.approx([errors[0]] * 3, rel=0.1)
     assert rows["generated", "splitting8"]["errors"]["position (m)"] < errors[0]
+    ratios = {(ratio["form"], ratio["family"]): ratio["ratio"] for ratio in account["families"]}
+    explicit_and_implicit = {("generic", "rkmk"), ("generic", "gauss"), ("generic", "taylor")}
+    assert explicit_and_implicit <= set(ratios)
+    assert ratios["generic", "gauss"] > 2
     assert "planar, step" in capsys.readouterr().out
+
+
+def test_quickly_a_family_is_stepped_by_one_method() -> None:
+    offered = {"rkmk4": 4, "rkmk54": 5, "rkmk87": 8, "splitting8": 8, "splitting10": 10, "t": 34}
+    assert _one_a_family(offered) == ["rkmk4", "rkmk87", "splitting8", "t"]
 
 
 def test_a_scene_without_a_step_is_refused(tmp_path: Path) -> None:

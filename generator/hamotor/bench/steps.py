@@ -13,7 +13,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from statistics import median
+from statistics import geometric_mean, median
 from typing import Any, Final
 
 from hamotor import __version__
@@ -25,8 +25,11 @@ from hamotor.run.simulation import Simulation, load
 
 SCENES: Final = ("tumble", "heavy_top", "spring_pendulum", "breathing_body")
 STEPS: Final = 2000
-REFERENCES: Final = (("splitting8", 4), ("rkmk4", 32))
+REFERENCES: Final = (("splitting8", 4), ("rkmk87", 4))
 """Methods with how many times shorter their steps are; the first that a scene has is taken."""
+BASELINE: Final = "rkmk4"
+QUICK_ORDER: Final = 8
+"""Quickly, a family is stepped by its method of the highest order up to this one."""
 FORMS: Final = {
     "generated": ("generated", "ga"),
     "generic": ("generic", "ga"),
@@ -41,6 +44,8 @@ class Row:
 
     scene: str
     form: str
+    family: str
+    """The method's name without its order."""
     method: str
     order: int
     step: float
@@ -59,18 +64,20 @@ def bench_steps(
 
     scenes: names or paths; four bundled ones if not given.  out: where steps.json goes; None:
     nowhere.  json: print the account on stdout instead of the table.  quick: three repetitions
-    instead of nine.  Returns the account.  Raises UsageError and ToolError as `hamotor run` does.
+    instead of nine, and one method a family.  Returns the account.  Raises UsageError and ToolError
+    as `hamotor run` does.
     """
     rows: list[Row] = []
     for scene in scenes or SCENES:
         print(f"stepping {scene}", file=sys.stderr, flush=True)
-        rows += _rows(load(scene), 3 if quick else 9)
+        rows += _rows(load(scene), quick=quick)
     account = {
         "benchmark": "steps",
         "quick": quick,
         "unit": "ns per step, median of the repetitions",
         "error": "distance at the end from a run in long double with shorter steps",
         "rows": [asdict(row) for row in rows],
+        "families": [asdict(family) for family in families(rows)],
         "provenance": {
             "version": __version__,
             "processor": processor_name(),
@@ -84,16 +91,16 @@ def bench_steps(
     return account
 
 
-def _rows(simulation: Simulation, repetitions: int) -> list[Row]:
+def _rows(simulation: Simulation, *, quick: bool) -> list[Row]:
     step = simulation.step
     if step is None:
         raise UsageError(f"{simulation.name}: has a tolerance; the benchmark needs [time] step")
     steps = min(STEPS, max(round(simulation.end / step), 1))
     end = steps * step
-    contestants = _contestants(simulation)
+    contestants = _contestants(simulation, quick=quick)
     times: dict[tuple[str, str], list[float]] = {c: [] for c in contestants}
     runs: dict[tuple[str, str], Run] = {}
-    for _ in range(repetitions):
+    for _ in range(3 if quick else 9):
         for form, method in contestants:
             kernels, representation = FORMS[form]
             run = simulation.run(
@@ -115,19 +122,57 @@ def _rows(simulation: Simulation, repetitions: int) -> list[Row]:
         Row(
             scene=simulation.name,
             form=form,
+            family=family_of(method),
             method=method,
             order=int(run.report["order"]),
             step=step,
             ns_per_step=median(times[form, method]),
             repetitions=times[form, method],
-            ratio=median(times[form, method]) / own.get(method, own["rkmk4"]),
+            ratio=median(times[form, method]) / own.get(method, own[BASELINE]),
             errors=_errors(run, reference),
         )
         for (form, method), run in runs.items()
     ]
 
 
-def _contestants(simulation: Simulation) -> list[tuple[str, str]]:
+def _one_a_family(offered: Mapping[str, int]) -> list[str]:
+    chosen: dict[str, str] = {}
+    for method, order in sorted(offered.items(), key=lambda item: item[1]):
+        if order <= QUICK_ORDER or family_of(method) not in chosen:
+            chosen[family_of(method)] = method
+    return [method for method in offered if method == BASELINE or method in chosen.values()]
+
+
+def family_of(method: str) -> str:
+    """`gauss` of `gauss8`."""
+    return method.rstrip("0123456789")
+
+
+@dataclass(frozen=True)
+class FamilyRatio:
+    """How many times as long as generated kernels a form takes for a family's steps."""
+
+    scene: str
+    form: str
+    family: str
+    ratio: float
+    """Geometric mean over the family's methods."""
+
+
+def families(rows: Sequence[Row]) -> list[FamilyRatio]:
+    """The ratios of all forms but the generated one."""
+    ratios: dict[tuple[str, str, str], list[float]] = {}
+    generated = {(row.scene, row.method) for row in rows if row.form == "generated"}
+    for row in rows:
+        if row.form != "generated" and (row.scene, row.method) in generated:
+            ratios.setdefault((row.scene, row.form, row.family), []).append(row.ratio)
+    return [
+        FamilyRatio(scene, form, family, geometric_mean(found))
+        for (scene, form, family), found in ratios.items()
+    ]
+
+
+def _contestants(simulation: Simulation, *, quick: bool) -> list[tuple[str, str]]:
     found = []
     for form, (kernels, representation) in FORMS.items():
         offered = simulation.offered(kernels, representation)
@@ -137,7 +182,7 @@ def _contestants(simulation: Simulation) -> list[tuple[str, str]]:
             )
         except UsageError:
             continue  # a group without this form
-        found += [(form, method) for method in offered]
+        found += [(form, method) for method in (_one_a_family(offered) if quick else offered)]
     return found
 
 
@@ -166,14 +211,19 @@ def table(account: Mapping[str, Any]) -> str:
         if row["scene"] != scene:
             scene = row["scene"]
             lines += ["", f"{scene}, step {row['step']:g} s"]
-            lines.append(f"  {'method':<12} {'form':<10} {'ns/step':>9} {'ratio':>7}  errors")
+            lines.append(f"  {'method':<15} {'form':<10} {'ns/step':>9} {'ratio':>7}  errors")
         errors = "  ".join(
             f"{name.split(' (')[0]} {value:.1e}"
             for name, value in row["errors"].items()
             if name.startswith(("attitude", "position", "scale", "energy"))
         )
         lines.append(
-            f"  {row['method']:<12} {row['form']:<10} {row['ns_per_step']:>9.1f}"
+            f"  {row['method']:<15} {row['form']:<10} {row['ns_per_step']:>9.1f}"
             f" {row['ratio']:>7.2f}  {errors}"
         )
+    lines += ["", "times as long as generated kernels, by family"]
+    lines += [
+        f"  {ratio['scene']:<16} {ratio['family']:<14} {ratio['form']:<8} {ratio['ratio']:7.2f}"
+        for ratio in account["families"]
+    ]
     return "\n".join(lines)
