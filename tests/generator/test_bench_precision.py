@@ -17,7 +17,7 @@ from hamotor.bench import endpoint
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import Extent, measure
 from hamotor.bench.precision_report import best, table, write_report
-from hamotor.bench.problems import REFERENCES, Problem, own_problems, problem
+from hamotor.bench.problems import REFERENCES, Problem, Reference, own_problems, problem
 from hamotor.bench.summary import summary
 
 
@@ -86,12 +86,25 @@ def test_a_setting_counts_only_if_the_next_two_finer_ones_meet_the_target() -> N
     assert best(rows, "p", 1e-4, ours=False) is None
 
 
+@pytest.mark.long
+def test_a_reference_in_two_precisions_has_25_digits() -> None:
+    reference = problem("planar").reference
+    found = re.fullmatch(r"Taylor .* differs by more than (\S+)", reference.certificate)
+    assert found is not None
+    assert float(found[1]) < 1e-25
+
+
 @pytest.mark.slow
 def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path: Path) -> None:
-    one = problem("planar")
-    simulation = replace(one.simulation, methods={"splitting8": 8, "splitting10": 10})
+    simulation = replace(problem("planar").simulation, methods={"splitting8": 8})
+    one = Problem("planar", simulation)
+    library = simulation.compile(method="splitting8").library
+    with library.start("splitting8", step=simulation.end / 4000, state=simulation.state) as live:
+        live.advance(4000, 0, None)
+        end = endpoint.of_row(library.description, live.observe())
+    vars(one)["reference"] = Reference(end, "splitting8", "none")  # one in quad takes a minute
     extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++", "clang++")[:1])
-    account = measure([Problem("planar", simulation)], extent, {}, {})
+    account = measure([one], extent, {}, {})
     assert "space" in account["not_there"]["public solvers on planar"]
     for method in simulation.methods:
         rows = [r for r in account["rows"] if r["contestant"] == method]

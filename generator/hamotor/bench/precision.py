@@ -450,6 +450,8 @@ def _row(contestant: Contestant, said: Mapping[str, Any], one: Problem) -> Row:
     )
     if row.failure is not None:
         return row
+    if not all(map(isfinite, said["final"])):
+        return replace(row, failure="not finite at the end")
     if contestant.kind == "scene":
         found = endpoint.of_row(contestant.said["description"], said["final"])
     else:
@@ -466,7 +468,7 @@ def _row(contestant: Contestant, said: Mapping[str, Any], one: Problem) -> Row:
             "evaluations": said["evaluations"],
             "set_up_s": said["set_up_s"],
             "errors": errors,
-            "failure": None if all(map(isfinite, errors.values())) else "not a number",
+            "failure": None if all(map(isfinite, errors.values())) else "out of the numbers",
         }
     )
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
-import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
@@ -15,6 +17,8 @@ import numpy as np
 from hamotor.bench import endpoint
 from hamotor.bench.endpoint import Endpoint
 from hamotor.errors import UsageError
+from hamotor.run.build import default_cache, default_includes, headers_digest
+from hamotor.run.library import SceneLibrary
 from hamotor.run.simulation import Simulation, load
 from hamotor.scene import Scene
 
@@ -33,7 +37,9 @@ GOALS: Final[Mapping[str, tuple[float | None, ...]]] = {
 """How many times faster than the best public solver to be at each of `TARGETS`, as prototypes were;
 None where no public solver gets there."""
 
-_ORDERS_OF_REFERENCES: Final = (("splitting10", "splitting8"), ("gauss8", "gauss6"))
+_WITNESSES: Final = (("mpfr50", 1e-36), ("quad", 1e-30))
+"""Two scalars, and the tolerances, s⁻¹, with which Taylor's method computes a reference in them."""
+_LARGEST_DOUBT: Final = 1e-12
 
 
 @dataclass(frozen=True)
@@ -61,7 +67,7 @@ class Problem:
 
     @cached_property
     def reference(self) -> Reference:
-        """From `tests/references`, or else computed in long double by two methods."""
+        """From `tests/references`, or else computed in 50 digits and again in quad."""
         file = REFERENCES / f"{self.name}.json"
         if file.is_file() and isinstance(self.scene, Scene):
             return _from_digits(file, self.scene)
@@ -98,27 +104,49 @@ def _from_digits(file: Path, scene: Scene) -> Reference:
 
 
 def _computed(simulation: Simulation) -> Reference:
-    offered = simulation.methods
-    methods = next(
-        (pair for pair in _ORDERS_OF_REFERENCES if set(pair) <= set(offered)),
-        ("rkmk4", "rkmk54"),
+    """In two precisions, kept; raises UsageError where they do not agree to 1e-12."""
+    runs = [f"Taylor series in {scalar}, tolerance {error:g}" for scalar, error in _WITNESSES]
+    key = json.dumps(
+        [simulation.spec_hash, simulation.end, runs, headers_digest(default_includes())]
     )
-    step = simulation.step or simulation.end / 1000
-    ends, finer = [], 1 if offered[methods[0]] >= 8 else 8
-    for method, factor in zip(methods, (finer, 2 * finer), strict=True):
-        library = simulation.compile(scalar="long_double", method=method).library
-        steps = math.ceil(simulation.end / step) * factor
-        with library.start(method, step=simulation.end / steps, state=simulation.state) as live:
-            live.advance(steps, 0, None)
-            row = np.array(live.observe_text(), np.longdouble)
-            ends.append(endpoint.of_row(library.description, row))
-    apart = endpoint.errors(ends[0], ends[1])
-    shown = ", ".join(f"{name} {distance:.1e}" for name, distance in apart.items())
+    file = default_cache() / "references" / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
+    kept = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
+    first, second = (simulation.compile(scalar=s, method="taylor") for s, _ in _WITNESSES)
+    if not kept:
+        ends = [
+            _end_of_taylor(simulation, compiled.library, tolerance)
+            for compiled, (_, tolerance) in zip((first, second), _WITNESSES, strict=True)
+        ]
+        columns = first.description.state_columns()
+        apart = max(abs(Fraction(ends[0][c]) - Fraction(ends[1][c])) for c in columns)
+        kept = {"row": ends[0], "apart": float(apart)}
+        file.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = file.with_name(f".{os.getpid()}-{file.name}")
+        unfinished.write_text(json.dumps(kept), encoding="utf-8")
+        unfinished.replace(file)
+    rows, apart = kept["row"], kept["apart"]
+    if not apart < _LARGEST_DOUBT:
+        raise UsageError(
+            f"{simulation.name}: {runs[0]} and {runs[1]} end {apart:.1e} apart, so that there is"
+            " no reference. The motion is chaotic or not smooth: end it earlier."
+        )
     return Reference(
-        ends[1],
-        f"{methods[1]} in long double",
-        f"{methods[0]} with twice the step differs: {shown}",
+        endpoint.of_row(first.description, [np.longdouble(x) for x in rows]),
+        runs[0],
+        f"{runs[1]}: no number of the state differs by more than {apart:.1e}",
     )
+
+
+def _end_of_taylor(simulation: Simulation, library: SceneLibrary, tolerance: float) -> list[str]:
+    """The row at the end, in decimals with all digits."""
+    parts = 16  # an answer to Ctrl-C now and then
+    step = Fraction(simulation.end) / parts
+    with library.start(
+        "taylor", step=step, state=simulation.exact_state, tolerance=tolerance
+    ) as live:
+        if any(live.advance(1, 0, None) < 1 for _ in range(parts)):
+            raise UsageError(f"{simulation.name}: no reference: {live.failure()[0].name}")
+        return live.observe_text()
 
 
 def _for_peers(scene: Any) -> Mapping[str, Any] | str:
