@@ -214,6 +214,7 @@ def test_a_method_that_needs_a_split_is_refused_where_there_is_none() -> None:
 @pytest.mark.parametrize(
     ("scene", "steps", "step", "allowed"),
     [("tumble", 10**8, 0.01, 1e-13), (PROBLEMS / "P1.toml", 10**7, 0.005, 2e-15)],
+    ids=["tumble", "P1"],
 )
 def test_energy_wanders_by_rounding_and_has_no_trend(
     scene: str | Path, steps: int, step: float, allowed: float

@@ -55,6 +55,18 @@ class TestText:
         assert "Gravity" not in text
         assert "Spring" not in text
 
+    def test_where_forces_act_is_said_of_bodies_in_space(self) -> None:
+        def points(name: str) -> list[str]:
+            text = re.sub(r"\s+", "", scene_source(read_scene(name)))
+            found = re.findall(r"(\w+)_points\{\{(.*?)\}\};", text)
+            assert text.count("_points)>") == len(found)
+            return [f"{body}{at}" for body, at in found]
+
+        assert points("heavy_top") == ["top{0,0,0.05}"]
+        assert points("spring_pendulum") == ["brick{0.05,0.1,0.15}"]
+        assert points("tumble") == []
+        assert points("planar") == []
+
     def test_a_spring_without_rest_length_has_the_smooth_potential(self) -> None:
         text = (BODIES["SE2"] + "[time]\nend = 1\nstep = 0.1\n").replace("rest_length = 0.3\n", "")
         assert "RestLength::zero" in scene_source(scene(text))

@@ -154,16 +154,16 @@ TEST(RotationSplit, knows_a_nearly_symmetric_body) {
   EXPECT_FALSE(hamotor::rotation_split(std::array<double, 3>{1, 2, 3}).nearly_symmetric);
 }
 
-TEST(HalfAngle, has_all_digits_of_any_angle) {
-  using hamotor::HalfAngle;
+TEST(AngleIncrement, has_all_digits_of_any_angle) {
+  using hamotor::AngleIncrement;
   using Wide = long double;
   double worst = 0;
   const auto expect_close = [&](double x) {
-    const auto half = HalfAngle<double>::of(x);
+    const auto angle = AngleIncrement<double>::of(x);
     const Wide sine = std::sin(static_cast<Wide>(x));
     const Wide quarter = std::sin(static_cast<Wide>(x) / 2);
-    worst = std::max({worst, static_cast<double>(std::abs((half.sine - sine) / sine)),
-                      static_cast<double>(std::abs((half.cosine_less_one + 2 * quarter * quarter) /
+    worst = std::max({worst, static_cast<double>(std::abs((angle.sine - sine) / sine)),
+                      static_cast<double>(std::abs((angle.cosine_less_one + 2 * quarter * quarter) /
                                                    (2 * quarter * quarter)))});
   };
   for (int k = 1; k < 4000; ++k) {
@@ -174,15 +174,15 @@ TEST(HalfAngle, has_all_digits_of_any_angle) {
   EXPECT_LT(worst, 3e-16);
   for (int k = 1; k < 4000; ++k) {
     for (const double x : {k * 0.0113, -k * 1.7, k * 1.1e5, -k * 3e7}) {
-      const auto half = HalfAngle<double>::of(x);
-      EXPECT_NEAR(half.sine, static_cast<double>(std::sin(static_cast<Wide>(x))), 2.3e-16);
-      EXPECT_NEAR(half.cosine_less_one, static_cast<double>(std::cos(static_cast<Wide>(x)) - 1),
+      const auto angle = AngleIncrement<double>::of(x);
+      EXPECT_NEAR(angle.sine, static_cast<double>(std::sin(static_cast<Wide>(x))), 2.3e-16);
+      EXPECT_NEAR(angle.cosine_less_one, static_cast<double>(std::cos(static_cast<Wide>(x)) - 1),
                   4.5e-16);
     }
   }
-  EXPECT_EQ(HalfAngle<double>::of(0).sine, 0);
-  EXPECT_EQ(HalfAngle<double>::of(0).cosine_less_one, 0);
-  EXPECT_TRUE(std::isnan(HalfAngle<double>::of(std::nan("")).sine));
+  EXPECT_EQ(AngleIncrement<double>::of(0).sine, 0);
+  EXPECT_EQ(AngleIncrement<double>::of(0).cosine_less_one, 0);
+  EXPECT_TRUE(std::isnan(AngleIncrement<double>::of(std::nan("")).sine));
 }
 
 TEST(RotationSplit, a_symmetry_saves_rotations) {

@@ -120,43 +120,52 @@ inline constexpr S series_bound = S(0x1.3bd3cc9be45dep-1);
 
 }  // namespace detail
 
-/// Sine of half the angle of a rotation and cosine of half the angle less one, both with all digits
-/// however small the angle.
+/// Sine of an angle and its cosine less one, both with all digits however small the angle.
 template <class S>
-struct HalfAngle {
+struct AngleIncrement {
   S sine;
   S cosine_less_one;
 
-  [[nodiscard]] HAMOTOR_INLINE static constexpr HalfAngle of(const S& half) noexcept {
+  [[nodiscard]] HAMOTOR_INLINE static constexpr AngleIncrement of(const S& angle) noexcept {
     if constexpr (detail::has_series<S>) {
-      const S z = half * half;
-      if (z <= detail::series_bound<S>) {
-        return {mul_add(half * z, detail::sine_series(z), half), z * detail::cosine_series(z)};
-      }
+      if (is_small(angle)) return of_small(angle);
     }
-    return of_any(half);
+    return of_any(angle);
+  }
+
+  /// Whether the polynomials are for this angle.
+  [[nodiscard]] HAMOTOR_INLINE static constexpr bool is_small(const S& angle) noexcept {
+    return angle * angle <= detail::series_bound<S>;
+  }
+
+  [[nodiscard]] HAMOTOR_INLINE static constexpr AngleIncrement of_small(const S& angle) noexcept {
+    const S z = angle * angle;
+    return {mul_add(angle * z, detail::sine_series(z), angle), z * detail::cosine_series(z)};
+  }
+
+  /// Of twice the angle.
+  [[nodiscard]] HAMOTOR_INLINE constexpr AngleIncrement twice() const noexcept {
+    return {S(2) * mul_add(sine, cosine_less_one, sine), S(-2) * sine * sine};
   }
 
  private:
-  [[nodiscard]] static constexpr HalfAngle of_any(const S& half) noexcept {
+  [[nodiscard]] static constexpr AngleIncrement of_any(const S& angle) noexcept {
     if constexpr (std::same_as<S, double> && has_fused_multiply_add) {
-      if (scalar::abs(half) < S(1e8)) return reduced(half);
+      if (scalar::abs(angle) < S(1e8)) return reduced(angle);
     }
-    const S sine = scalar::sin(S(0.5) * half);
-    return {S(2) * sine * scalar::cos(S(0.5) * half), S(-2) * sine * sine};
+    const S sine = scalar::sin(S(0.5) * angle);
+    return {S(2) * sine * scalar::cos(S(0.5) * angle), S(-2) * sine * sine};
   }
 
   /// By the rest after quarter turns, π/2 in three words (Cody & Waite 1980).
-  [[nodiscard]] static constexpr HalfAngle reduced(const S& half) noexcept {
+  [[nodiscard]] static constexpr AngleIncrement reduced(const S& angle) noexcept {
     constexpr S to_integer = S(0x1.8p52);
-    const S shifted = mul_add(half, S(0x1.45f306dc9c883p-1), to_integer);
+    const S shifted = mul_add(angle, S(0x1.45f306dc9c883p-1), to_integer);
     const S quarters = shifted - to_integer;
     const S rest = mul_add(-quarters, S(-0x1.f1976b7ed8fbcp-110),
                            mul_add(-quarters, S(0x1.1a62633145c07p-54),
-                                   mul_add(-quarters, S(0x1.921fb54442d18p+0), half)));
-    const S z = rest * rest;
-    const S sine = mul_add(rest * z, detail::sine_series(z), rest);
-    const S cosine_less_one = z * detail::cosine_series(z);
+                                   mul_add(-quarters, S(0x1.921fb54442d18p+0), angle)));
+    const auto [sine, cosine_less_one] = of_small(rest);
     switch (static_cast<long long>(quarters) & 3) {
       case 0:
         return {sine, cosine_less_one};
@@ -211,22 +220,21 @@ struct Turning {
   std::array<S, R> angular;
 };
 
-/// Turns momenta and rotors about the axis E_k by −θ and θ.
+/// Turns momenta and rotors about the axis E_k by −θ and θ, given θ/2 and θ.
 ///
 /// Π between the turns of a step is its start and what was added since: added to itself every time,
 /// its rounding errors would grow, and with them those of the angles.
 template <std::size_t K, class S>
-HAMOTOR_INLINE constexpr void turn_about_axis(const HalfAngle<S>& half,
+HAMOTOR_INLINE constexpr void turn_about_axis(const AngleIncrement<S>& half,
+                                              const AngleIncrement<S>& whole,
                                               const std::array<S, 3>& start, std::array<S, 3>& pi,
                                               Turning<S, 3>& change) noexcept {
   constexpr std::size_t i = (K + 1) % 3;
   constexpr std::size_t j = (K + 2) % 3;
   const S& a = half.cosine_less_one;
   const S& b = half.sine;
-  const S sine = S(2) * mul_add(b, a, b);
-  const S cosine_less_one = S(-2) * b * b;
-  const S change_i = mul_add(cosine_less_one, pi[i], sine * pi[j]);
-  const S change_j = mul_add(cosine_less_one, pi[j], -sine * pi[i]);
+  const S change_i = mul_add(whole.cosine_less_one, pi[i], whole.sine * pi[j]);
+  const S change_j = mul_add(whole.cosine_less_one, pi[j], -whole.sine * pi[i]);
   change.angular[i] = change.angular[i] + change_i;
   change.angular[j] = change.angular[j] + change_j;
   pi[i] = start[i] + change.angular[i];
@@ -330,7 +338,7 @@ class PrincipalRotation {
   [[nodiscard]] constexpr Change free_step(
       const Angular& pi, const S& h, const SplittingWeights<S, stages>& weights) const noexcept {
     if constexpr (R == 1) {
-      const auto half = HalfAngle<S>::of(S(0.5) * h * inverse_[0] * pi[0]);
+      const auto half = AngleIncrement<S>::of(S(0.5) * h * inverse_[0] * pi[0]);
       return {{half.cosine_less_one, {half.sine}}, {S(0)}};
     } else {
       Change change{spherical_change(pi, h), {}};
@@ -409,16 +417,16 @@ class PrincipalRotation {
       u[j] = factor * p[j];
       const S square = mul_add(u[i], u[i], mul_add(u[j], u[j], u[outer] * u[outer]));
       const auto [ratio, cosine_less_one] = half_about(square);
-      const S sine = S(2) * mul_add(ratio, cosine_less_one, ratio);
-      const S versine = S(2) * ratio * ratio;
+      const S half_sine = mul_add(ratio, cosine_less_one, ratio);
+      const S half_versine = ratio * ratio;
       const S along = factor * vertical;
       const Angular before = g;
       for (std::size_t a = 0; a < 3; ++a) {
         const std::size_t b = (a + 1) % 3;
         const std::size_t c = (a + 2) % 3;
-        const S crossed = mul_add(before[b], u[c], -before[c] * u[b]);
-        const S across = mul_add(along, u[a], -square * before[a]);
-        g[a] = mul_add(sine, crossed, mul_add(versine, across, before[a]));
+        const S crossed = S(2) * mul_add(before[b], u[c], -before[c] * u[b]);
+        const S across = S(2) * mul_add(along, u[a], -square * before[a]);
+        g[a] = mul_add(half_sine, crossed, mul_add(half_versine, across, before[a]));
       }
       change.rotor = detail::composed(
           change.rotor,
@@ -448,14 +456,25 @@ class PrincipalRotation {
       }
     }
     const S x = scalar::sqrt(square);
-    const auto half = HalfAngle<S>::of(x);
+    const auto half = AngleIncrement<S>::of(x);
     return {select(x > S(0), half.sine / x, S(1)), half.cosine_less_one};
   }
 
   template <std::size_t K>
   HAMOTOR_INLINE static constexpr void turn(const S& half_per_momentum, const Angular& start,
                                             Angular& pi, Change& change) noexcept {
-    detail::turn_about_axis<K>(HalfAngle<S>::of(half_per_momentum * pi[K]), start, pi, change);
+    using Increment = AngleIncrement<S>;
+    const S x = half_per_momentum * pi[K];
+    if constexpr (detail::has_series<S>) {
+      // The next turn waits for this one's Π: not for the half angle as well, where it need not.
+      if (Increment::is_small(x + x)) {
+        detail::turn_about_axis<K>(Increment::of_small(x), Increment::of_small(x + x), start, pi,
+                                   change);
+        return;
+      }
+    }
+    const auto half = Increment::of(x);
+    detail::turn_about_axis<K>(half, half.twice(), start, pi, change);
   }
 
   Angular moments_;
