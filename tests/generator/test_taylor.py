@@ -44,7 +44,7 @@ from hamotor.mechanics.states import (
 )
 from hamotor.mechanics.straightline import FUNCTIONS
 from hamotor.mechanics.system import System
-from hamotor.run.library import SceneLibrary, Vector
+from hamotor.run.library import Failure, SceneLibrary, Vector
 from hamotor.scene import Scene, bundled_scenes, read_scene, scene_source
 from hamotor.scene.motors import rotation_matrix
 from hamotor.scene.principal_system import principal_system
@@ -305,6 +305,20 @@ step = 0.01
 # ---------------------------------------------------------------- whole runs
 
 
+FALL = """algebra = "pga3"
+group = "T3"
+[[body]]
+name = "b"
+position = [1, 0, 0]
+[hamiltonian]
+expression = "norm_squared(P)/2 - 1/norm(position)"
+[time]
+end = 2.0
+step = 0.01
+"""
+"""From rest at distance 1 to an attracting centre."""
+
+
 def library_of(folder: Path, problem: str) -> tuple[SceneLibrary, Vector, dict[str, Any]]:
     """A problem of tests/references with the method compiled, its start and its solution."""
     reference = json.loads((REFERENCES / f"{problem}.json").read_text())
@@ -379,6 +393,30 @@ def test_dense_output_costs_no_steps_and_no_digits(problems: Callable[[str], Any
         assert run.advance(5000, 0, None) == 5000
         assert run.steps() == coarse < 1000
         assert np.abs(run.state() - at_the_end).max() < 1e-12
+
+
+def test_the_account_of_work_is_a_coordinate() -> None:
+    simulation = hamotor.load("rocket")
+    library = simulation.compile(method="taylor").library
+    column = {c.name: k for k, c in enumerate(library.description.columns)}
+    with library.start("taylor", step=4.0, state=simulation.state) as run:
+        before = run.observe()
+        assert run.advance(1, 0, None) == 1
+        after = run.observe()
+    gained = after[column["energy"]] - before[column["energy"]]
+    assert gained > 1
+    assert abs(gained - after[column["work"]]) < 1e-11 * gained
+
+
+def test_a_collision_stops_the_run(tmp_path: Path) -> None:
+    path = tmp_path / "fall.toml"
+    path.write_text(FALL)
+    simulation = hamotor.load(path)
+    library = simulation.compile(method="taylor").library
+    with library.start("taylor", step=1.0, state=simulation.state, tolerance=1e-9) as run:
+        assert run.advance(1, 0, None) == 1
+        assert run.advance(1, 0, None) == 0, "the centre is reached at t = π/√8"
+        assert run.failure()[0] in {Failure.STEP_TOO_SHORT, Failure.NOT_FINITE}
 
 
 def test_time_runs_backwards(problems: Callable[[str], Any]) -> None:

@@ -78,11 +78,10 @@ class Taylor {
   static constexpr int order = detail::series_order(scalar::Limits<S>::digits);
   static constexpr std::string_view name = "taylor";
 
-  /// Asks for this local error a unit of time, s⁻¹, relative to motors and momenta; the rounding
-  /// of the scalar bounds it below.
+  /// Asks for this local error a unit of time, s⁻¹, relative to motors and momenta; for rounding
+  /// only, in every step, where it is not positive or a step would have to be better than that.
   constexpr void set_tolerance(const S& tolerance) noexcept {
-    const S least = scalar::Limits<S>::epsilon();
-    tolerance_ = select(tolerance > least, tolerance, least);
+    tolerance_ = select(tolerance > S(0), tolerance, S(0));
     int bits = 0;
     for (S x = tolerance_; x < S(1) && bits < scalar::Limits<S>::digits; x = x + x) ++bits;
     length_ = detail::series_order(bits);
@@ -99,21 +98,12 @@ class Taylor {
     while (scalar::abs(offset_) > reach_) {
       const S step = select(offset_ > S(0), reach_, -reach_);
       if (!(reach_ > scalar::Limits<S>::epsilon() * scalar::abs(t))) {
-        const S size = step - step;
-        failure_ = size == S(0) ? Failure::step_too_short : Failure::not_finite;
-        for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
-        known_ = false;
-        return;
+        return fail(state, step - step == S(0) ? Failure::step_too_short : Failure::not_finite);
       }
       advance(step);
       offset_ = offset_ - step;
     }
-    if (!(reach_ > S(0))) {
-      failure_ = Failure::not_finite;
-      for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
-      known_ = false;
-      return;
-    }
+    if (!(reach_ > S(0))) return fail(state, Failure::not_finite);
     const Coordinates change = increment(offset_);
     Coordinates x = coefficients_[0];
     for (std::size_t i = 0; i < n; ++i) x[i] = x[i] + (change[i] + low_[i]);
@@ -159,6 +149,12 @@ class Taylor {
   [[nodiscard]] static constexpr bool is_near(const S& a, const S& b, const S& h) noexcept {
     const S size = select(scalar::abs(a) > scalar::abs(h), scalar::abs(a), scalar::abs(h));
     return scalar::abs(a - b) <= S(8) * scalar::Limits<S>::epsilon() * size;
+  }
+
+  constexpr void fail(StateOf<System>& state, Failure reason) noexcept {
+    failure_ = reason;
+    for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+    known_ = false;
   }
 
   constexpr void start(const StateOf<System>& state, const S& t) noexcept {
@@ -279,7 +275,12 @@ class Taylor {
         if (size > S(0)) ratio = scalar::max_abs(ratio, last[g] / size);
       }
       if (!(ratio > S(0))) continue;
-      const S exponent = scalar::log(tolerance_ / ratio) / S(static_cast<int>(m) - 1);
+      // r hᵐ ≤ ε, or, if that is longer, r hᵐ ≤ e h.
+      S exponent = scalar::log(scalar::Limits<S>::epsilon() / ratio) / S(static_cast<int>(m));
+      if (tolerance_ > S(0)) {
+        const S asked = scalar::log(tolerance_ / ratio) / S(static_cast<int>(m) - 1);
+        exponent = select(asked > exponent, asked, exponent);
+      }
       shortest = select(shortest > exponent, exponent, shortest);
     }
     return select(shortest < unlimited(), scalar::exp(shortest), unlimited());
@@ -307,7 +308,7 @@ class Taylor {
   detail::SeriesRows<Recurrence, S, lanes, static_cast<std::size_t>(order) + 1> rows_;
   Coordinates low_{};
   StateOf<System> delivered_{};
-  S tolerance_ = scalar::Limits<S>::epsilon();
+  S tolerance_ = S(0);
   S reach_ = S(0);
   S offset_ = S(0);
   S time_ = S(0);
