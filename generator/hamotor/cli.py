@@ -197,6 +197,12 @@ def _parser() -> _Parser:
         action="store_true",
         help="install heyoka, SciPy and MuJoCo first, to measure precision beside",
     )
+    bench.add_argument(
+        "--drift",
+        metavar="N",
+        type=_whole_number,
+        help="for precision: steps of the long runs (default: a million; none if quick)",
+    )
     return parser
 
 
@@ -621,6 +627,7 @@ def _bench(parsed: argparse.Namespace) -> int:
             json=parsed.json,
             quick=parsed.quick,
             with_peers=parsed.with_peers,
+            drift=parsed.drift,
         )
         return 0
     if parsed.what == "stability":

@@ -14,6 +14,7 @@ import pytest
 from tests.bench.precision import peers
 
 from hamotor.bench import endpoint
+from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import Extent, measure
 from hamotor.bench.precision_report import best, table, write_report
@@ -103,7 +104,7 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
         live.advance(4000, 0, None)
         end = endpoint.of_row(library.description, live.observe())
     vars(one)["reference"] = Reference(end, "splitting8", "none")  # one in quad takes a minute
-    extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++", "clang++")[:1])
+    extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++",), drift=20_000)
     account = measure([one], extent, {}, {})
     assert "space" in account["not_there"]["public solvers on planar"]
     for method in simulation.methods:
@@ -113,7 +114,10 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
         errors = [row["errors"][POSITION] for row in rows if row["failure"] is None]
         assert min(errors) < 1e-3 * max(errors)
         assert all(0 < row["best_us"] <= row["median_us"] <= row["worst_us"] for row in rows)
-    assert "planar" in table(account)
+    (energy,) = (row for row in account["drift"] if row["quantity"] == "energy")
+    assert energy["steps"] == 20_000
+    assert 0 < energy["largest"] < 1e-10
+    assert "long runs" in table(account)
     json_file, page_file, *_ = write_report(account, tmp_path)
     page = page_file.read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=|https?://(?!www\.w3\.org/2000/svg)", page)
@@ -121,6 +125,16 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
     assert embedded is not None
     assert json.loads(embedded[1]) == json.loads(json_file.read_text(encoding="utf-8"))
     assert (tmp_path / "precision_planar.svg").is_file()
+
+
+def test_growth_is_the_exponent_of_the_largest_error_so_far() -> None:
+    counts = np.arange(1.0, 1001) * 100
+    exponent, doubt = _growth(counts, 1e-16 * counts**0.5)
+    assert exponent == pytest.approx(0.5)
+    assert doubt == pytest.approx(0, abs=1e-9)
+    exponent, _ = _growth(counts, np.full(1000, 1e-16))
+    assert exponent == pytest.approx(0, abs=1e-12)
+    assert _growth(counts, np.zeros(1000)) == (None, None)
 
 
 def test_the_summary_says_what_a_kernel_and_a_digit_cost() -> None:

@@ -23,18 +23,23 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from hamotor import __version__
 from hamotor.bench import endpoint
+from hamotor.bench.drift import Drift, drifts
 from hamotor.bench.precision_report import RULES, leaders, standings, table, write_report
 from hamotor.bench.problems import GOALS, ROOT, TARGETS, Problem, own_problems, problem
 from hamotor.errors import HamotorError, ToolError
 from hamotor.run.build import compile_scene, default_cache, eigen, find_compiler, processor_name
+from hamotor.run.library import SceneLibrary
 from hamotor.scene import METHODS
 
 BENCH: Final = ROOT / "tests" / "bench" / "precision"
 PEERS_PYTHON: Final = ROOT / ".hamotor" / "peers" / "solvers" / "bin" / "python"
 INSTALL: Final = "./hamotor bench precision --with-peers"
 COMPILERS: Final = ("g++", "clang++")
+_LONGEST_RUN_S: Final = 300.0
 
 _ODEINT: Final = ("odeint rkf78", "odeint dopri5", "odeint Bulirsch-Stoer")
 _FORMS: Final = (
@@ -98,9 +103,11 @@ class Extent:
     enough_s: float
     forms: bool
     compilers: Sequence[str]
+    drift: int = 0
+    """Steps of the long runs; 0: none."""
 
 
-FULL: Final = Extent(8, 2 ** (1 / 3), 0.015, 0.15, True, COMPILERS)
+FULL: Final = Extent(8, 2 ** (1 / 3), 0.015, 0.15, True, COMPILERS, 10**6)
 QUICK: Final = Extent(3, 2.0, 0.004, 0.02, False, COMPILERS[:1])
 
 
@@ -110,13 +117,15 @@ def bench_precision(
     json: bool = False,
     quick: bool = False,
     with_peers: bool = False,
+    drift: int | None = None,
 ) -> dict[str, Any]:
     """Run and account for the benchmark of precision.
 
     scenes: names or paths of scenes; the benchmark's own problems if not given.  out: where
     precision.json, the diagrams and precision.html go; None: nowhere.  json: print the account on
     stdout instead of the table.  quick: fewer settings and repetitions, one compiler, no other
-    kernels or scalars.  with_peers: first install the public solvers that come from PyPI.
+    kernels or scalars.  with_peers: first install the public solvers that come from PyPI.  drift:
+    steps of the long runs, a million if not given, none if quick.
     Returns the account.  Raises UsageError and ToolError as `hamotor run` does.
     """
     gaps: dict[str, str] = {}
@@ -124,7 +133,10 @@ def bench_precision(
         install_peers()
     peers = peers_here(gaps)
     problems = [problem(name) for name in (scenes or own_problems())]
-    account = measure(problems, QUICK if quick else FULL, peers, gaps)
+    extent = QUICK if quick else FULL
+    if drift is not None:
+        extent = replace(extent, drift=drift)
+    account = measure(problems, extent, peers, gaps)
     _print(account, as_json=json)
     if out is not None:
         for file in write_report(account, out):
@@ -172,11 +184,13 @@ def measure(
                 _say(f"{one.name}: compiling {', '.join(leading)} with {compiler}")
                 contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
     rows = refused + _times(problems, contestants, extent)
+    long_runs = _long_runs(problems, contestants, compilers[0], extent.drift)
     account = {
         "benchmark": "precision",
         "targets": list(TARGETS),
         "problems": said,
         "rows": [asdict(row) for row in rows],
+        "drift": [asdict(drift) for drift in long_runs],
         "not_there": missing,
         "rules": list(RULES),
         "provenance": _provenance(compilers, peers, extent),
@@ -185,11 +199,31 @@ def measure(
 
 
 def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
-    print(json.dumps(account, indent=1) if as_json else table(account), flush=True)
+    print(json.dumps(account, indent=1, allow_nan=False) if as_json else table(account), flush=True)
 
 
 def _say(text: str) -> None:
     print(text, file=sys.stderr, flush=True)
+
+
+def _long_runs(
+    problems: Sequence[Problem], contestants: Sequence[Contestant], compiler: str, steps: int
+) -> list[Drift]:
+    """The generated kernels in double; a method that would take minutes takes fewer steps."""
+    by_name = {one.name: one.simulation for one in problems}
+    found: list[Drift] = []
+    for c in contestants:
+        if not steps or c.family != "hamotor" or c.form or c.compiler != compiler:
+            continue
+        _say(f"{c.problem}: {steps:,} steps of {c.name}")
+        library = SceneLibrary(Path(c.said["library"]))
+        trial = drifts(c.problem, by_name[c.problem], library, c.name, 1000)
+        needed = trial[0].seconds / 1000 if trial else 0.0
+        affordable = min(steps, int(_LONGEST_RUN_S / max(needed, 1e-9)))
+        if trial and trial[0].steps == 1000:
+            trial = drifts(c.problem, by_name[c.problem], library, c.name, affordable)
+        found += trial
+    return found
 
 
 def _compilers(extent: Extent) -> list[str]:
@@ -452,11 +486,12 @@ def _row(contestant: Contestant, said: Mapping[str, Any], one: Problem) -> Row:
         return row
     if not all(map(isfinite, said["final"])):
         return replace(row, failure="not finite at the end")
-    if contestant.kind == "scene":
-        found = endpoint.of_row(contestant.said["description"], said["final"])
-    else:
-        found = endpoint.of_quaternion(one.scene, said["final"])
-    errors = endpoint.errors(found, one.reference.end)
+    with np.errstate(all="ignore"):  # a run that exploded may leave what a double holds
+        if contestant.kind == "scene":
+            found = endpoint.of_row(contestant.said["description"], said["final"])
+        else:
+            found = endpoint.of_quaternion(one.scene, said["final"])
+        errors = endpoint.errors(found, one.reference.end)
     return Row(
         **{
             **asdict(row),
@@ -467,8 +502,8 @@ def _row(contestant: Contestant, said: Mapping[str, Any], one: Problem) -> Row:
             "steps": said["steps"],
             "evaluations": said["evaluations"],
             "set_up_s": said["set_up_s"],
-            "errors": errors,
-            "failure": None if all(map(isfinite, errors.values())) else "out of the numbers",
+            "errors": {name: e for name, e in errors.items() if isfinite(e)},
+            "failure": None if all(map(isfinite, errors.values())) else "an error is not finite",
         }
     )
 

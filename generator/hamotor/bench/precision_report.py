@@ -131,11 +131,30 @@ def table(account: Mapping[str, Any]) -> str:
         failures = sum(r["problem"] == name and r["failure"] is not None for r in account["rows"])
         if failures:
             lines.append(f"  {failures} settings failed; they are rows of the account")
+    lines += _long_runs(account["drift"])
     lines += ["", *(f"not compared: {who}: {why}" for who, why in account["not_there"].items())]
     said = account["provenance"]
     peers = ", ".join(f"{who} {version}" for who, version in said["peers"].items())
     lines.append(f"{said['processor']}; {'; '.join(said['compilers'].values())}; {peers}")
     return "\n".join(lines)
+
+
+def _long_runs(drift: Rows) -> list[str]:
+    """The energy at the end of the long runs, with how it grew."""
+    lines = (
+        ["", "long runs: largest relative error of the energy, growing as steps^p"] if drift else []
+    )
+    for row in drift:
+        if row["quantity"] != "energy":
+            continue
+        grown = "-"
+        if row["exponent"] is not None:
+            grown = f"{row['exponent']:.2f} ± {row['exponent_error']:.2f}"
+        lines.append(
+            f"  {row['problem']:<12}{row['contestant']:<18}{row['steps']:>12,} steps of"
+            f" {row['step']:g} s{row['largest']:>10.1e}   p = {grown}"
+        )
+    return lines
 
 
 def _cells(found: Mapping[str, Any] | None, width: int) -> str:
@@ -150,9 +169,10 @@ def write_report(account: Mapping[str, Any], out: Path) -> list[Path]:
     Returns the files.  The page holds the whole account and needs no network.
     """
     out.mkdir(parents=True, exist_ok=True)
-    whole = json.dumps(account)
+    # A browser reads no NaN.
+    whole = json.dumps(account, allow_nan=False)
     files = [out / "precision.json", out / "precision.html"]
-    files[0].write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
+    files[0].write_text(json.dumps(account, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     # What a script element holds ends at its first end tag, in a string or not.
     page = _PAGE.read_text(encoding="utf-8").replace("@ACCOUNT@", whole.replace("</", "<\\/"))
     files[1].write_text(page, encoding="utf-8")
