@@ -30,7 +30,7 @@ def test_observed_orders_are_within_a_tenth_of_the_nominal(
     includes = [f"-I{folder}" for folder in default_includes()]
     subprocess.run(
         [
-            str(find_compiler(default_cache())),
+            *find_compiler(default_cache()).command,
             *("-std=c++20", "-O1", "-ffp-contract=off", *includes),
             *(f'-DHEADER="hamotor/{header}"', f"-DGROUP=hamotor::{group}", f"-DLENGTH={length}"),
             *(str(SOURCE), "-o", str(program)),
