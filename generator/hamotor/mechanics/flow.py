@@ -16,9 +16,9 @@ from hamotor.codegen.program import Program
 from hamotor.codegen.taylor import PACK, Quadratic, Recurrence, quadratic, recurrence
 from hamotor.mechanics.body_frame import BodyFrame, Rewriting, Unsuitable
 from hamotor.mechanics.coordinates import Coordinates, Expr
-from hamotor.mechanics.hamiltonian import TIME, coadjoint
+from hamotor.mechanics.hamiltonian import TIME, Hamiltonian, coadjoint
 from hamotor.mechanics.straightline import straight_line
-from hamotor.mechanics.system import Definition, System, folded
+from hamotor.mechanics.system import Definition, System, folded, gradient_symbols
 
 WORK = "work"
 """The coordinate that is ∫ dH/dt dt."""
@@ -53,7 +53,7 @@ class Flow:
 def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
     """The flow whose recurrence is the least work, that recurrence, and its field if quadratic."""
     found = []
-    for flow in flows(system):
+    for flow in rigid_flows(system) or [motor_flow(system)]:
         r = recurrence(flow.field)
         found.append((flow, r, quadratic(r)))
 
@@ -67,9 +67,16 @@ def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
 
 def flows(system: System) -> list[Flow]:
     """The coordinates that there are for the motion."""
-    found = [motor_flow(system)]
+    return [motor_flow(system), *rigid_flows(system)]
+
+
+def rigid_flows(system: System) -> list[Flow]:
+    """Those for rigid motions, which are never more work than motors; none for other systems."""
+    found: list[Flow] = []
     with suppress(Unsuitable):
         found += [body_flow(system, rows=rows) for rows in (True, False)]
+    with suppress(Unsuitable):
+        found.append(world_flow(system))
     return found
 
 
@@ -197,6 +204,123 @@ def body_flow(system: System, *, rows: bool) -> Flow:
     )
 
 
+def world_flow(system: System) -> Flow:
+    """In rotors, angular momenta and the world's x and p = R P; for rigid motions of bodies whose
+    velocity is a multiple of P, also of bodies that see each other.
+
+    ẋ = P/m and ṗ = f have no products. Unsuitable for other groups, other kinetic energies, and
+    where forques are applied.
+    """
+    h = system.hamiltonian
+    if h.applied or not h.autonomous:
+        raise Unsuitable("applied forques")
+    motion: dict[Expr, Expr] = {}
+    kinds: dict[Expr, tuple[int, str, int] | None] = {}
+    names: dict[Expr, str] = {}
+    places: list[Definition] = []
+    rates: list[Definition] = []
+    back: dict[str, Expr] = {}
+    entered: dict[Expr, Expr] = {}
+    rotations: list[Definition] = []
+    for k, body in enumerate(h.bodies):
+        space, generators = body.space, body.group.generators
+        if not space.affine or space.scales or not space.translates:
+            raise Unsuitable(f"{body.group.name} is no group of rigid motions")
+        d = range(body.dimension)
+        x, p = body.position, tuple(sympy.Symbol(f"_p{k}_{j}", real=True) for j in d)
+        moves = [any(v) for v in space.velocities]
+        mass = _mass_of(h, k, moves)
+        held = h.energy.free_symbols & set(body.motor)
+        if held:
+            raise Unsuitable("components of motors")
+        turned = [(v.symbol, f"R{k}_{n}", v.definition) for n, v in enumerate(body.frame_variables)]
+        rotations += turned
+        places += turned
+        for n, point in enumerate(body.points):
+            if any(point.place):
+                offset = body.turned(point.place)
+                places += [
+                    (s, f"y{n}{'xyzw'[j]}_{k}", x[j] + offset[j])
+                    for j, s in enumerate(point.symbols)
+                ]
+        b = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in generators)
+        rates += [
+            (s, f"rate{k}_{g.rate}", folded(rate, h.parameters))
+            for s, g, rate, moving in zip(b, generators, h.rates[k], moves, strict=True)
+            if not moving
+        ]
+        still = {s: sympy.Integer(0) for s, moving in zip(b, moves, strict=True) if moving}
+        for variable, c in zip(body.motor_variables, body.group.element.components, strict=True):
+            if not _length(c.name):
+                motion[variable.symbol] = _dot(b, variable.variation).subs(still)
+                kinds[variable.symbol] = k, "motor", 0
+        # P × V is zero, V being a multiple of P.
+        turning = coadjoint(body, b)
+        gone = still | {
+            m: sympy.Integer(0) for m, moving in zip(body.momenta, moves, strict=True) if moving
+        }
+        for i, (momentum, g) in enumerate(zip(body.momenta, generators, strict=True)):
+            if not moves[i]:
+                motion[momentum] = turning[i].subs(gone) - system.forques[f"forque{k}.{g.momentum}"]
+                kinds[momentum] = k, "momentum", 0
+        forces = [sympy.Integer(0) for _ in d]
+        for n, _ in enumerate(h.gradients(body), 1):
+            for j, s in enumerate(gradient_symbols(body, k, n, "world")):
+                forces[j] -= s
+        for j in d:
+            motion[x[j]], kinds[x[j]] = p[j] / mass, (k, "place", 1)
+            motion[p[j]], kinds[p[j]] = forces[j], (k, "momentum", 1)
+            names |= {x[j]: f"x{k}_{j}", p[j]: f"p{k}_{j}"}
+        linear = _momentum_of(body)
+        entered |= dict(zip(x, body.origin, strict=True))
+        entered |= dict(zip(p, body.turned(linear), strict=True))
+        seen = dict(zip(linear, body.turned_back(p), strict=True))
+        frame = BodyFrame(body, k, x)
+        left = _left(system, [frame], (sympy.Integer(0),) * body.dimension)
+        back |= {name: value.subs(seen) for name, value in left.items()}
+    pulls = [(s, name, folded(value, h.parameters)) for s, name, value in system.pulls]
+    motion = {s: folded(value, h.parameters) for s, value in motion.items()}
+    names |= {s: system.names[s] for s in motion if s not in names}
+    indexed = {s: f"x[{i}]" for i, s in enumerate(motion)}
+    return Flow(
+        straight_line({names[s]: x for s, x in motion.items()}, names, [*places, *pulls, *rates]),
+        straight_line(
+            {f"x[{i}]": entered.get(s, s) for i, s in enumerate(motion)}, system.names, rotations
+        ),
+        straight_line(back, indexed, rotations),
+        Program((), (), (), None),
+        _numbered([kinds[s] for s in motion]),
+        len(motion),
+    )
+
+
+def _mass_of(h: Hamiltonian, k: int, moves: list[bool]) -> Expr:
+    """m of V = P/m."""
+    body = h.bodies[k]
+    pairs = [
+        (folded(rate, h.parameters), p)
+        for rate, p, moving in zip(h.rates[k], body.momenta, moves, strict=True)
+        if moving
+    ]
+    inverse = {sympy.expand(rate / p) for rate, p in pairs}
+    (found, *others) = inverse
+    linear = {p for _, p in pairs}
+    turning = [r for r, moving in zip(h.rates[k], moves, strict=True) if not moving]
+    if others or not found.is_Rational or any(r.free_symbols & linear for r in turning):
+        raise Unsuitable("V is no multiple of P")
+    return 1 / found
+
+
+def _momentum_of(body: Coordinates) -> tuple[Expr, ...]:
+    """P, by the world's directions."""
+    return tuple(
+        sympy.Add(
+            *(_exact(v[j]) * m for v, m in zip(body.space.velocities, body.momenta, strict=True))
+        )
+        for j in range(body.dimension)
+    )
+
+
 _WORK = sympy.Symbol("_work", real=True)
 
 
@@ -244,8 +368,13 @@ def _entering(
     return straight_line(outputs, system.names, rotations)
 
 
-def _left(system: System, frames: list[BodyFrame]) -> dict[str, Expr]:
-    """M = T(o) R T(X), T(v) = 1 + Σ v_i E_i, in the coordinates; and momenta as they are."""
+def _left(
+    system: System, frames: list[BodyFrame], seen_at: tuple[Expr, ...] | None = None
+) -> dict[str, Expr]:
+    """M = T(o) R T(X), T(v) = 1 + Σ v_i E_i, in the coordinates; and momenta as they are.
+
+    seen_at: X, if it is not the frame's own.
+    """
     outputs: dict[str, Expr] = {}
     for frame in frames:
         body = frame.body
@@ -254,7 +383,8 @@ def _left(system: System, frames: list[BodyFrame]) -> dict[str, Expr]:
             if not _length(c.name):
                 for blade, x in c.embedding.items():
                     rotor[blade] = rotor.get(blade, 0) + symbol * _exact(x)
-        there, seen = (_translator(body, v) for v in (frame.origin, frame.place))
+        place = frame.place if seen_at is None else seen_at
+        there, seen = _translator(body, frame.origin), _translator(body, place)
         motor = _product(body, _product(body, there, rotor), seen)
         for symbol, reading in zip(body.motor, body.group.element.reading, strict=True):
             outputs[system.names[symbol]] = sympy.Add(

@@ -116,7 +116,7 @@ class System:
         found: list[Definition] = []
         for k, body in enumerate(self.hamiltonian.bodies):
             for n, (_, gradient) in enumerate(self.hamiltonian.gradients(body), 1):
-                world = _gradient_symbols(body, k, n, "world")
+                world = gradient_symbols(body, k, n, "world")
                 found += [
                     (symbol, f"gradient{n}{axis}_{k}", x)
                     for symbol, axis, x in zip(world, "xyzw", gradient, strict=False)
@@ -125,7 +125,7 @@ class System:
                 found += [
                     (symbol, f"pull{n}{axis}_{k}", x)
                     for symbol, axis, x in zip(
-                        _gradient_symbols(body, k, n, "body"), "xyzw", pulled, strict=False
+                        gradient_symbols(body, k, n, "body"), "xyzw", pulled, strict=False
                     )
                 ]
         return found
@@ -140,7 +140,7 @@ class System:
             for i, generator in enumerate(body.group.generators):
                 total = sum((slope * v.variation[i] for v, slope in slopes), sympy.Integer(0))
                 for n, (point, _) in enumerate(gradients, 1):
-                    pulled = _gradient_symbols(body, k, n, "body")
+                    pulled = gradient_symbols(body, k, n, "body")
                     total += sum(v * g for v, g in zip(point.velocities[i], pulled, strict=True))
                 if h.applied:
                     total += h.applied[k][i]
@@ -148,7 +148,8 @@ class System:
         return outputs
 
 
-def _gradient_symbols(body: Coordinates, k: int, n: int, frame: str) -> tuple[Expr, ...]:
+def gradient_symbols(body: Coordinates, k: int, n: int, frame: str) -> tuple[Expr, ...]:
+    """The gradient at the n-th point that H holds, in `world` or pulled back to the `body`."""
     return tuple(
         sympy.Symbol(f"_{frame}{k}_{n}_{axis}", real=True) for axis in range(body.dimension)
     )
