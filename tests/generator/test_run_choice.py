@@ -28,7 +28,7 @@ def table() -> dict[str, Any]:
 def test_the_table_speaks_of_known_structures_and_methods_in_order_of_time() -> None:
     by_name = {m.name: m for m in METHODS}
     assert set(table()) <= set(STRUCTURES)
-    assert {"free", "symmetric"} <= set(table())
+    assert set(STRUCTURES) - {"forced", "rough", "several"} <= set(table())
     for measured in table().values():
         for entries in measured["cheapest"].values():
             assert {e["method"] for e in entries} <= set(by_name)
@@ -87,6 +87,8 @@ def test_what_is_exact_is_taken_for_free_bodies_and_said_to_be_measured() -> Non
 
 def test_without_a_tolerance_structure_is_kept() -> None:
     assert choose_method("auto", SPLIT, None, "symmetric")[0] == "splitting2"
+    general = choose_method("auto", GENERAL, None, "general")[0]
+    assert {m.name: m.promises for m in METHODS}[general] & ALL == ALL
     assert choose_method("auto", GENERAL, None, "forced")[0] == "rkmk4"
 
 

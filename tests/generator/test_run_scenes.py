@@ -79,14 +79,6 @@ def test_the_final_state_in_a_wider_scalar_has_all_its_digits(tmp_path: Path) ->
     assert np.abs(rotation @ rotation.T - np.eye(3)).max() < 8 * np.finfo(np.longdouble).eps
 
 
-@pytest.mark.parametrize(("tolerance", "method"), [(1e-3, "splitting2"), (1e-8, "rkmk4")])
-def test_auto_meets_a_small_tolerance_with_the_higher_order(tolerance: float, method: str) -> None:
-    run = hamotor.load("dzhanibekov").run(end=1, tolerance=tolerance)
-    assert run.report["method"] == method
-    assert run.report["method_reason"]
-    assert run.report["tolerance"]["achieved"] <= tolerance
-
-
 @pytest.mark.parametrize("method", ["rkmk4", "rk4", "splitting2"])
 def test_the_methods_agree_where_the_steps_are_short(method: str) -> None:
     simulation = hamotor.load("tumble")

@@ -1,8 +1,8 @@
-"""The table that `method = "auto"` reads, from accounts of `bench precision`.
+"""The table that `method = "auto"` reads, from measurements of `bench precision`.
 
-    ./hamotor bench precision kirchhoff --quick --out DIR
-    python -m hamotor.bench.choice DIR/precision.json …
+    python -m hamotor.bench.choice P1 P3 P4 planar two_bodies kirchhoff rocket
 
+measures these scenes; accounts that there are already, `DIR/precision.json`, are taken as they are.
 A problem stands for the structure that its scene has.  Structures that no account covers keep what
 the table says of them; of several accounts of one structure the last counts.
 """
@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from hamotor.bench.precision import COMPILERS, Extent, measure
 from hamotor.bench.precision_report import by_contestant, meeting
 from hamotor.bench.problems import problem
 from hamotor.errors import UsageError
@@ -24,6 +25,7 @@ from hamotor.scene.methods import ALL
 from hamotor.scene.structure import STRUCTURES, structure_of
 
 _KEPT = 4
+_EXTENT = Extent(3, 2.0, 0.05, 0.05, False, COMPILERS[:1])
 _SPLIT = ("free", "planar", "several", "symmetric", "asymmetric")
 _ORDER_WITHOUT_SPLIT = 4
 """Where a step has to be iterated, order 4 costs hardly more than order 2."""
@@ -73,14 +75,17 @@ def tabulated(account: Mapping[str, Any], name: str) -> dict[str, Any]:
 
 
 def main(files: Sequence[str]) -> int:
-    """Put these accounts into the table."""
+    """Put these scenes and accounts into the table."""
     if not files:
-        raise UsageError("give files precision.json of ./hamotor bench precision SCENE --out DIR")
+        raise UsageError("give scenes to measure, or files precision.json of bench precision")
     table: dict[str, Any] = {"structures": {}}
     if TABLE.is_file():
         table = json.loads(TABLE.read_text(encoding="utf-8"))
     for file in files:
-        account = json.loads(Path(file).read_text(encoding="utf-8"))
+        if file.endswith(".json"):
+            account = json.loads(Path(file).read_text(encoding="utf-8"))
+        else:
+            account = measure([problem(file)], _EXTENT, {}, {})
         for name in account["problems"]:
             said = tabulated(account, name)
             structure = said.pop("structure")
