@@ -75,7 +75,7 @@ step = 0.01
     )
     simulation = hamotor.load(path)
     assert simulation.structure == "rough"
-    assert choose_method("auto", simulation.methods, 1e-6, "rough")[0] in simulation.methods
+    assert choose_method("auto", simulation.methods, 1e-6, "rough")[0] == "rkmk54"
 
 
 def test_what_is_exact_is_taken_for_free_bodies_and_said_to_be_measured() -> None:
@@ -83,6 +83,9 @@ def test_what_is_exact_is_taken_for_free_bodies_and_said_to_be_measured() -> Non
     assert method == "closed_form"
     assert "in the least time" in reason
     assert choose_method("auto", GENERAL, 1e-10, "free")[0] in GENERAL, "of what is offered"
+    assert "measured" in choose_method("auto", GENERAL, 1e-10, "rough")[1]
+    alike = [choose_method("auto", SPLIT, 1e-9, like) for like in ("several", "asymmetric")]
+    assert alike[0] == alike[1]
 
 
 def test_without_a_tolerance_structure_is_kept() -> None:

@@ -21,6 +21,9 @@ _PRESERVING = {
     ),
 }
 _FALLBACKS = ("splitting2", "rkmk4")
+_LIKE = {"several": "asymmetric", "forced": "general"}
+"""What a structure without measurements of its own is likened to, where a tolerance is given."""
+_ROUGH = "rkmk54", "it chooses its steps, so that it can shorten them at corners; not measured"
 
 
 @cache
@@ -42,15 +45,18 @@ def choose_method(
     if asked != "auto":
         check_method(asked, {**methods, "auto": 0})
         return asked, ""
-    measured = _table()["structures"].get(structure)
-    if measured is not None:
-        found = (
-            _preserving(measured, methods)
-            if tolerance is None
-            else _cheapest(measured, methods, tolerance)
-        )
-        if found is not None:
-            return found
+    structures = _table()["structures"]
+    found = None
+    if tolerance is None and structure in structures:
+        found = _preserving(structures[structure], methods)
+    elif tolerance is not None and structure == "rough" and _ROUGH[0] in methods:
+        found = _ROUGH
+    elif tolerance is not None:
+        for known in (structure, _LIKE.get(structure)):
+            if found is None and known in structures:
+                found = _cheapest(structures[known], methods, tolerance)
+    if found is not None:
+        return found
     for name in _FALLBACKS:
         if name in methods:
             return name, _PRESERVING.get(name, "nothing cheaper was measured on such scenes")
