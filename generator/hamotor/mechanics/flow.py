@@ -58,9 +58,13 @@ def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
         found.append((flow, r, quadratic(r)))
 
     def work(choice: tuple[Flow, Recurrence, Quadratic | None]) -> int:
-        # A node of its own costs more than its sum; packs of a quadratic field have none.
+        # In the time of one sum: a node of its own costs more, a pack of linear terms half of one
+        # of products.
         _, r, packed = choice
-        return PACK * len(packed.products) if packed else 3 * len(r.lanes)
+        if packed is None:
+            return 3 * len(r.lanes)
+        linear = len(packed.fixed) + len(packed.linear) + packed.packs
+        return PACK * len(packed.products) + PACK // 2 * linear
 
     return min(found, key=work)
 

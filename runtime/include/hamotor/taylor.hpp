@@ -82,6 +82,7 @@ class Taylor {
   /// only, in every step, where it is not positive or a step would have to be better than that.
   constexpr void set_tolerance(const S& tolerance) noexcept {
     tolerance_ = select(tolerance > S(0), tolerance, S(0));
+    if (tolerance_ > S(0)) log_tolerance_ = scalar::log(tolerance_);
     int bits = 0;
     for (S x = tolerance_; x < S(1) && bits < scalar::Limits<S>::digits; x = x + x) ++bits;
     length_ = detail::series_order(bits);
@@ -276,9 +277,10 @@ class Taylor {
       }
       if (!(ratio > S(0))) continue;
       // r hᵐ ≤ ε, or, if that is longer, r hᵐ ≤ e h.
-      S exponent = scalar::log(scalar::Limits<S>::epsilon() / ratio) / S(static_cast<int>(m));
+      const S log_ratio = scalar::log(ratio);
+      S exponent = (log_epsilon_ - log_ratio) / S(static_cast<int>(m));
       if (tolerance_ > S(0)) {
-        const S asked = scalar::log(tolerance_ / ratio) / S(static_cast<int>(m) - 1);
+        const S asked = (log_tolerance_ - log_ratio) / S(static_cast<int>(m) - 1);
         exponent = select(asked > exponent, asked, exponent);
       }
       shortest = select(shortest > exponent, exponent, shortest);
@@ -309,6 +311,8 @@ class Taylor {
   Coordinates low_{};
   StateOf<System> delivered_{};
   S tolerance_ = S(0);
+  S log_tolerance_ = S(0);
+  S log_epsilon_ = scalar::log(scalar::Limits<S>::epsilon());
   S reach_ = S(0);
   S offset_ = S(0);
   S time_ = S(0);
