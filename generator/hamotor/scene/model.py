@@ -103,7 +103,7 @@ class Time:
     step: float | None
     """Of a fixed step, s; None where a tolerance is given."""
     tolerance: float | None
-    """Of the final state: halving the step changes it by no more. None where a step is given."""
+    """Of the final state, verified by a second, finer run. None where a step is given."""
     method: str
     """`auto`, or a method's name."""
 

@@ -481,7 +481,7 @@ TIME = Section(
         Key(
             "tolerance",
             "positive",
-            "instead of step: halving the step then changes the final state by no more",
+            "instead of step: of the final state, verified by a second, finer run",
             example="1e-10",
             active=False,
         ),
