@@ -128,6 +128,8 @@ def test_decimals_reach_the_runtime_in_all_their_digits(simulation: hamotor.Simu
         assert row is not None
         state = [row[k] for k in library.description.state_columns()]
         assert max(abs(float(a - b)) for a, b in zip(state, third, strict=True)) < 1e-33
+    start = simulation.exact_state  # a motor: what is none would stop the run
+    with library.start("splitting4", step=Fraction(1, 10), state=start) as run:
         assert run.advance(1, 0, None) == 1
         assert abs(Fraction(run.observe_text()[0]) - Fraction(1, 10)) < Fraction(1, 10**34)
         assert np.isfinite(run.observe()).all()
