@@ -48,7 +48,7 @@ class Simulation:
     """
 
     name: str
-    source: Callable[[str, str], str]
+    source: Callable[..., str]
     state: Vector
     end: float
     step: float | None
