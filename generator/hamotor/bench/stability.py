@@ -348,7 +348,7 @@ def judged(case: str, simulation: Simulation, reference: Reference, method: str)
         lever = max(
             1.0, float(np.abs(np.concatenate([coarse.motor(b) for b in coarse.bodies])).max())
         )
-        momenta_bound = ROUNDINGS * EPSILON["double"] * math.sqrt(steps) * lever**2
+        momenta_bound = 4 * ROUNDINGS * EPSILON["double"] * math.sqrt(steps) * lever**2
         figures["momenta"] = momenta
         if momenta > momenta_bound:
             failures.append(f"momenta change by {momenta:.1e}, more than {momenta_bound:.1e}")
