@@ -154,7 +154,7 @@ def test_a_tolerance_is_met_back_in_time(stone: hamotor.Simulation) -> None:
 
 def test_a_time_limit_keeps_what_was_computed(stone: hamotor.Simulation) -> None:
     with pytest.raises(RunFailed, match="time limit passed after step") as caught:
-        stone.run(end=-1e6, step=1e-3, every=1000, time_limit=0.2)
+        stone.run(end=-300.0, step=1e-6, every=1000, time_limit=0.2)
     run = caught.value.run
     assert caught.value.exit_code == 3
     assert run.report["failure"]["reason"] == "time_limit"

@@ -97,9 +97,9 @@ def test_a_tolerance_is_a_bound_on_the_error_of_the_final_state() -> None:
 
 
 def test_a_scene_that_cannot_be_told_from_chaos_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    from hamotor.run import runner
+    from hamotor.run import tolerance
 
-    monkeypatch.setattr(runner, "_PATIENCE", 4)
+    monkeypatch.setattr(tolerance, "_PATIENCE", 4)
     with pytest.raises(hamotor.RunFailed, match="chaotic over this time: end it earlier"):
         hamotor.load("spring_pendulum").run(tolerance=1e-6)
 

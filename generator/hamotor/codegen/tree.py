@@ -31,14 +31,16 @@ ROOM = 40_000
 """Characters that are formatted at a time: several processes share a long file."""
 COMPONENT = re.compile(r"(?<=[(,] )-?[a-z]\w*\.\w+(?=[,)])|(?<=\()-?[a-z]\w*\.\w+(?=[,)])")
 """An argument such as `-a.e12`: four tokens, over which clang-format weighs as many line breaks."""
+LONG = 5_000
+"""Characters of a statement from which on it is given a shorter look."""
 STAND_IN = re.compile(r"\$z+")
 
 
 def formatted(files: Sequence[SourceFile]) -> tuple[SourceFile, ...]:
     """The files as clang-format leaves them, in the project's style.
 
-    With fewer tokens than components have, it searches further: its layout of the longest
-    statements is better than what it makes of the file itself.
+    Of the longest statements, those some of six dimensions, it sees fewer tokens than there
+    are, over which it would take most of the time.
     """
     sources = {f.path: _pieces(f.text) for f in files if f.path.endswith((".hpp", ".cpp"))}
     longest_first = sorted((p for pieces in sources.values() for p in pieces), key=len)[::-1]
@@ -61,7 +63,9 @@ def _pieces(text: str) -> list[str]:
 
 
 def _formatted(text: str) -> str:
-    """One piece; clang-format sees a word of equal length in place of each component."""
+    """One piece; where it is long clang-format sees a word of equal length for each component."""
+    if max(map(len, text.split(";"))) < LONG:
+        return clang_format(text)
     shown = COMPONENT.sub(lambda found: "$".ljust(len(found[0]), "z"), text)
     components = COMPONENT.finditer(text)
     return STAND_IN.sub(lambda _: next(components)[0], clang_format(shown))
