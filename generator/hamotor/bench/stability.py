@@ -21,10 +21,8 @@ then is that numbers stay finite and that what is promised for every step holds.
 from __future__ import annotations
 
 import ctypes
-import json
 import math
 import os
-import platform
 import sys
 import tempfile
 from collections import Counter
@@ -38,9 +36,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from hamotor import __version__
+from hamotor.bench.account import provenance, publish
 from hamotor.errors import NumericsError, UsageError, suggest
-from hamotor.run.build import compile_scene, processor_name
+from hamotor.run.build import compile_scene
 from hamotor.run.library import Vector
 from hamotor.run.result import Run, RunFailed
 from hamotor.run.simulation import Simulation, load
@@ -144,32 +142,20 @@ def bench_stability(
             for row in case["rows"]
             if row["verdict"] == "fail"
         ],
-        "provenance": {
-            "version": __version__,
-            "processor": processor_name(),
-            "machine": platform.machine(),
-        },
+        "provenance": provenance(),
     }
-    _print(account, as_json=json)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        _write(account, out / "stability.json")
+    publish(account, table, out=out, as_json=json)
     return account
 
 
 def _compile(simulation: Simulation, methods: Sequence[str]) -> None:
     """All that a case needs, on all cores; runs find it in the cache."""
-    # Texts first, one at a time: the precision of mpmath is one for all threads.
     wanted = {(method, "double") for method in methods}
     wanted |= {(method, "float") for method in methods if method in QUICK}
     wanted |= {(method, WIDE) for method in REFERENCES if method in simulation.methods}
-    for scalar in (*EPSILON, WIDE):
-        with suppress(UsageError):  # a number that the scalar does not hold
-            simulation.source("generated", scalar)
-            simulation.source("generated", scalar, "taylor")
 
     def compiled(what: tuple[str, str]) -> None:
-        with suppress(UsageError):
+        with suppress(UsageError):  # a number that the scalar does not hold
             simulation.compile(method=what[0], scalar=what[1])
 
     with ThreadPoolExecutor(os.cpu_count()) as pool:
@@ -438,15 +424,6 @@ def _energy_errors(simulation: Simulation, method: str) -> tuple[float, float]:
 def _description(simulation: Simulation) -> str:
     assert simulation.read is not None
     return simulation.read().description
-
-
-def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
-    print(json.dumps(account, indent=1) if as_json else table(account), flush=True)
-
-
-def _write(account: Mapping[str, Any], file: Path) -> None:
-    file.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-    print(f"wrote {file}", file=sys.stderr, flush=True)
 
 
 COLUMNS: Final = ("error", "error at half the step", "momenta", "energy", "reversal", "float")

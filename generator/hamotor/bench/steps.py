@@ -7,8 +7,6 @@ interleaved, and a time is the median of them. The error is the distance at the 
 
 from __future__ import annotations
 
-import json
-import platform
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -16,9 +14,8 @@ from pathlib import Path
 from statistics import geometric_mean, median
 from typing import Any, Final
 
-from hamotor import __version__
+from hamotor.bench.account import provenance, publish
 from hamotor.errors import UsageError
-from hamotor.run.build import processor_name
 from hamotor.run.comparison import compare
 from hamotor.run.result import Run
 from hamotor.run.simulation import Simulation, load
@@ -78,16 +75,9 @@ def bench_steps(
         "error": "distance at the end from a run in long double with shorter steps",
         "rows": [asdict(row) for row in rows],
         "families": [asdict(family) for family in families(rows)],
-        "provenance": {
-            "version": __version__,
-            "processor": processor_name(),
-            "machine": platform.machine(),
-        },
+        "provenance": provenance(),
     }
-    _print(account, as_json=json)
-    if out is not None:
-        out.mkdir(parents=True, exist_ok=True)
-        _write(account, out / "steps.json")
+    publish(account, table, out=out, as_json=json)
     return account
 
 
@@ -192,15 +182,6 @@ def _errors(run: Run, reference: Run) -> dict[str, float]:
         key = f"{difference.quantity} ({difference.unit})"
         errors[key] = max(errors.get(key, 0.0), difference.at_end)
     return errors
-
-
-def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
-    print(json.dumps(account, indent=1) if as_json else table(account), flush=True)
-
-
-def _write(account: Mapping[str, Any], file: Path) -> None:
-    file.write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-    print(f"wrote {file}", file=sys.stderr, flush=True)
 
 
 def table(account: Mapping[str, Any]) -> str:

@@ -10,6 +10,7 @@ import hashlib
 import json
 import os
 import re
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -23,6 +24,7 @@ DERIVING = (
 )
 """The folders whose files decide what is derived."""
 MOST_KEPT = 200
+_ONE_AT_A_TIME = threading.RLock()  # mpmath has one precision for all threads
 
 
 _OWN_ALGEBRA = re.compile(rb"""^\s*algebra\s*=\s*["']([^"'\n]+\.toml)["']""", re.MULTILINE)
@@ -55,10 +57,11 @@ class Remembered:
 
     def value(self, name: str, derive: Callable[[], Any]) -> Any:
         """What is kept under `name`, or else what `derive` says, kept from now on."""
-        if name not in self._values:
-            self._values[name] = derive()
-            self._write()
-        return self._values[name]
+        with _ONE_AT_A_TIME:
+            if name not in self._values:
+                self._values[name] = derive()
+                self._write()
+            return self._values[name]
 
     def _write(self) -> None:
         unfinished = self._path.with_name(f".{self._path.name}-{os.getpid()}")
