@@ -392,10 +392,19 @@ template <class Scene>
   return list.text();
 }
 
+/// What a library that is compiled for ensembles says of them (ensemble_abi.hpp).
+template <class Scene>
+[[nodiscard]] std::string ensemble_json();
+
 /// The JSON of `hamotor_describe`.
 template <class Scene>
 [[nodiscard]] std::string description() {
   using Group = typename Scene::Group;
+#ifdef HAMOTOR_ENSEMBLE
+  const std::string ensemble = ",\n \"ensemble\": " + ensemble_json<Scene>();
+#else
+  const std::string ensemble;
+#endif
   return "{\"abi\": 2, \"scene\": " + json_string(Scene::name) +
          ", \"algebra\": " + json_string(Group::algebra) +
          ", \"group\": " + json_string(Group::name) +
@@ -410,7 +419,7 @@ template <class Scene>
          ",\n \"momentum\": " + json_strings(Group::generators) +
          ",\n \"columns\": " + columns_json<Scene>() +
          ",\n \"conserved\": " + conserved_json<Scene>() +
-         ",\n \"events\": " + events_json<Scene>() + "}\n";
+         ",\n \"events\": " + events_json<Scene>() + ensemble + "}\n";
 }
 
 /// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
@@ -820,6 +829,13 @@ template <class Scene>
 #define HAMOTOR_SCENE_EXPORT extern "C" __attribute__((visibility("default")))
 #endif
 
+#ifdef HAMOTOR_ENSEMBLE
+#include "hamotor/ensemble_abi.hpp"
+#define HAMOTOR_SCENE_ENSEMBLE(Scene) HAMOTOR_ENSEMBLE_FUNCTIONS(Scene)
+#else
+#define HAMOTOR_SCENE_ENSEMBLE(Scene) static_assert(sizeof(hamotor::scene::RunOf<Scene>) > 0)
+#endif
+
 /// Defines the C functions of the compiled scene `Scene`; once in a shared library.
 #define HAMOTOR_SCENE(Scene)                                                                    \
   HAMOTOR_SCENE_EXPORT const char* hamotor_describe() {                                         \
@@ -872,4 +888,4 @@ template <class Scene>
   HAMOTOR_SCENE_EXPORT void hamotor_stop(void* run) {                                           \
     delete static_cast<hamotor::scene::RunOf<Scene>*>(run);                                     \
   }                                                                                             \
-  static_assert(sizeof(hamotor::scene::RunOf<Scene>) > 0)
+  HAMOTOR_SCENE_ENSEMBLE(Scene)
