@@ -2370,13 +2370,9 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 86 mul, 56 add (52 fused), 1 div, 1 bivector_logarithm, 2 select, 1 sqrt.
+/// Cost: 179 mul, 122 add (107 fused), 3 div, 1 abs, 4 select, 2 sqrt, 1 turned_logarithm.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> log(const Versor<S>& m) noexcept {
-  const S square = dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i, S(2),
-                       dot(-m.e01, m.e1i, -m.e02, m.e2i, -m.e03, m.e3i));
-  const S rho =
-      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
   const S t_e1i = dot(-m.e123i, m.e23, -m.e031i, m.e3i, m.e012i, m.e2i);
   const S t_e2i = dot(-m.e123i, m.e31, m.e023i, m.e3i, -m.e012i, m.e1i);
   const S t_e3i = dot(-m.e12, m.e123i, -m.e023i, m.e2i, m.e031i, m.e1i);
@@ -2387,6 +2383,10 @@ template <class S>
   const S t_e03 = dot(m.e02, m.e023i, -m.e01, m.e031i, -m.e0123, m.e12);
   const S t_e02 = dot(-m.e023i, m.e03, m.e01, m.e012i, -m.e0123, m.e31);
   const S t_e01 = dot(m.e03, m.e031i, -m.e012i, m.e02, -m.e0123, m.e23);
+  const S square = dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i, S(2),
+                       dot(-m.e01, m.e1i, -m.e02, m.e2i, -m.e03, m.e3i));
+  const S rho =
+      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
   const S twice = S(2) * m.s;
   const S omega = twice * twice * rho;
   const S root_omega = scalar::sqrt(omega);
@@ -2402,20 +2402,49 @@ template <class S>
   const S u_e01 = mul_add(share, t_e01, m.e01);
   const S u_e02 = mul_add(share, t_e02, m.e02);
   const S u_e03 = mul_add(share, t_e03, m.e03);
-  const auto f = scalar::bivector_logarithm(
-      m.s, square, rho, isoclinic,
-      dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
-          dot(-u_e23, u_e23, -u_e13, u_e13, -u_e12, u_e12, u_e0i, u_e0i)));
-  return {.e23 = dot(f.bivector, m.e23, f.twisted, t_e23),
-          .e31 = -dot(f.bivector, -m.e31, f.twisted, t_e13),
-          .e12 = dot(f.bivector, m.e12, f.twisted, t_e12),
-          .e1i = dot(f.bivector, m.e1i, f.twisted, t_e1i),
-          .e2i = dot(f.bivector, m.e2i, f.twisted, t_e2i),
-          .e3i = dot(f.bivector, m.e3i, f.twisted, t_e3i),
-          .e0i = dot(f.bivector, m.e0i, f.twisted, -t_e0i),
-          .e01 = dot(f.bivector, m.e01, f.twisted, t_e01),
-          .e02 = dot(f.bivector, m.e02, f.twisted, t_e02),
-          .e03 = dot(f.bivector, m.e03, f.twisted, t_e03)};
+  const auto f =
+      scalar::turned_logarithm(m.s, square, rho, isoclinic,
+                               dot(-u_e01, u_e1i, -u_e02, u_e2i, -u_e03, u_e3i, S(0.5),
+                                   dot(-u_e23, u_e23, -u_e13, u_e13, -u_e12, u_e12, u_e0i, u_e0i)));
+  const S y_e01 = dot(f.part, m.e01, f.part_twisted, t_e01);
+  const S y_e02 = dot(f.part, m.e02, f.part_twisted, t_e02);
+  const S y_e12 = dot(f.part, m.e12, f.part_twisted, t_e12);
+  const S y_e03 = dot(f.part, m.e03, f.part_twisted, t_e03);
+  const S y_e13 = dot(f.part, -m.e31, f.part_twisted, t_e13);
+  const S y_e23 = dot(f.part, m.e23, f.part_twisted, t_e23);
+  const S y_e0i = dot(f.part, m.e0i, f.part_twisted, -t_e0i);
+  const S y_e1i = dot(f.part, m.e1i, f.part_twisted, t_e1i);
+  const S y_e2i = dot(f.part, m.e2i, f.part_twisted, t_e2i);
+  const S y_e3i = dot(f.part, m.e3i, f.part_twisted, t_e3i);
+  const S v_e0123 = dot(y_e01, y_e23, -y_e02, y_e13, y_e03, y_e12);
+  const S v_e012i = dot(y_e01, y_e2i, -y_e02, y_e1i, y_e0i, y_e12);
+  const S v_e013i = dot(y_e01, y_e3i, -y_e03, y_e1i, y_e0i, y_e13);
+  const S v_e023i = dot(y_e02, y_e3i, -y_e03, y_e2i, y_e0i, y_e23);
+  const S v_e123i = dot(y_e12, y_e3i, -y_e13, y_e2i, y_e1i, y_e23);
+  const S length2 = scalar::abs(dot(-y_e12, y_e12, -y_e13, y_e13, -y_e23, y_e23, y_e0i, y_e0i, S(2),
+                                    dot(-y_e01, y_e1i, -y_e02, y_e2i, -y_e03, y_e3i)));
+  const S spin = select(f.turn > S(0), f.turn / scalar::sqrt(length2), S(0));
+  const S away = select(f.turn > S(0), spin / length2, S(0));
+  return {.e23 = dot(f.bivector, m.e23, f.twisted, t_e23, spin, y_e23, away,
+                     dot(-v_e123i, y_e01, v_e023i, y_e0i, -v_e0123, y_e1i)),
+          .e31 = -dot(f.bivector, -m.e31, f.twisted, t_e13, spin, y_e13, away,
+                      dot(v_e123i, y_e02, v_e013i, y_e0i, v_e0123, y_e2i)),
+          .e12 = dot(f.bivector, m.e12, f.twisted, t_e12, spin, y_e12, away,
+                     dot(-v_e123i, y_e03, v_e012i, y_e0i, -v_e0123, y_e3i)),
+          .e1i = dot(f.bivector, m.e1i, f.twisted, t_e1i, spin, y_e1i, away,
+                     dot(-v_e123i, y_e23, v_e012i, y_e2i, v_e013i, y_e3i)),
+          .e2i = dot(f.bivector, m.e2i, f.twisted, t_e2i, spin, y_e2i, away,
+                     dot(v_e123i, y_e13, -v_e012i, y_e1i, v_e023i, y_e3i)),
+          .e3i = dot(f.bivector, m.e3i, f.twisted, t_e3i, spin, y_e3i, away,
+                     dot(-v_e123i, y_e12, -v_e013i, y_e1i, -v_e023i, y_e2i)),
+          .e0i = dot(f.bivector, m.e0i, f.twisted, -t_e0i, spin, y_e0i, away,
+                     dot(-v_e012i, y_e12, -v_e013i, y_e13, -v_e023i, y_e23)),
+          .e01 = dot(f.bivector, m.e01, f.twisted, t_e01, spin, y_e01, away,
+                     dot(-v_e012i, y_e02, -v_e013i, y_e03, -v_e0123, y_e23)),
+          .e02 = dot(f.bivector, m.e02, f.twisted, t_e02, spin, y_e02, away,
+                     dot(v_e012i, y_e01, -v_e023i, y_e03, v_e0123, y_e13)),
+          .e03 = dot(f.bivector, m.e03, f.twisted, t_e03, spin, y_e03, away,
+                     dot(v_e013i, y_e01, v_e023i, y_e02, -v_e0123, y_e12))};
 }
 
 /// cayley: Bivector -> Versor

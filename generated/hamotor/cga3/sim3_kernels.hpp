@@ -283,23 +283,45 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 43 mul, 20 add (19 fused), 1 bivector_logarithm.
+/// Cost: 96 mul, 54 add (45 fused), 2 div, 1 abs, 2 select, 1 sqrt, 1 turned_logarithm.
 template <class S>
 [[nodiscard]] constexpr sim3::Rate<S> log(const Similarity<S>& m) noexcept {
-  const auto f = scalar::bivector_logarithm(
-      m.s, dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i),
-      dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i));
-  return {.w23 = S(-2) * dot(f.bivector, m.e23, f.twisted, m.e023i * m.e0i),
-          .w31 = S(2) * dot(f.bivector, -m.e31, f.twisted, -m.e031i * m.e0i),
-          .w12 = S(-2) * dot(f.bivector, m.e12, f.twisted, m.e012i * m.e0i),
-          .v1 = S(-2) * dot(f.bivector, m.e1i, f.twisted,
-                            dot(-m.e123i, m.e23, -m.e031i, m.e3i, m.e012i, m.e2i)),
-          .v2 = S(-2) * dot(f.bivector, m.e2i, f.twisted,
-                            dot(-m.e123i, m.e31, m.e023i, m.e3i, -m.e012i, m.e1i)),
-          .v3 = S(-2) * dot(f.bivector, m.e3i, f.twisted,
-                            dot(-m.e12, m.e123i, -m.e023i, m.e2i, m.e031i, m.e1i)),
-          .d = S(2) * dot(f.bivector, m.e0i, f.twisted,
-                          dot(-m.e023i, m.e23, -m.e031i, m.e31, -m.e012i, m.e12))};
+  const S t_e1i = dot(-m.e123i, m.e23, -m.e031i, m.e3i, m.e012i, m.e2i);
+  const S t_e2i = dot(-m.e123i, m.e31, m.e023i, m.e3i, -m.e012i, m.e1i);
+  const S t_e3i = dot(-m.e12, m.e123i, -m.e023i, m.e2i, m.e031i, m.e1i);
+  const S t_e0i = dot(m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+  const S t_e23 = m.e023i * m.e0i;
+  const S t_e13 = m.e031i * m.e0i;
+  const S t_e12 = m.e012i * m.e0i;
+  const auto f =
+      scalar::turned_logarithm(m.s, dot(-m.e23, m.e23, -m.e31, m.e31, -m.e12, m.e12, m.e0i, m.e0i),
+                               dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i));
+  const S y_e12 = dot(f.part, m.e12, f.part_twisted, t_e12);
+  const S y_e13 = dot(f.part, -m.e31, f.part_twisted, -t_e13);
+  const S y_e23 = dot(f.part, m.e23, f.part_twisted, t_e23);
+  const S y_e0i = dot(f.part, m.e0i, f.part_twisted, -t_e0i);
+  const S y_e1i = dot(f.part, m.e1i, f.part_twisted, t_e1i);
+  const S y_e2i = dot(f.part, m.e2i, f.part_twisted, t_e2i);
+  const S y_e3i = dot(f.part, m.e3i, f.part_twisted, t_e3i);
+  const S v_e012i = y_e0i * y_e12;
+  const S v_e123i = dot(y_e12, y_e3i, -y_e13, y_e2i, y_e1i, y_e23);
+  const S v_e013i = y_e0i * y_e13;
+  const S v_e023i = y_e0i * y_e23;
+  const S length2 = scalar::abs(dot(-y_e12, y_e12, -y_e13, y_e13, -y_e23, y_e23, y_e0i, y_e0i));
+  const S spin = select(f.turn > S(0), f.turn / scalar::sqrt(length2), S(0));
+  const S away = select(f.turn > S(0), spin / length2, S(0));
+  return {
+      .w23 = S(-2) * dot(f.bivector, m.e23, f.twisted, t_e23, spin, y_e23, away, v_e023i * y_e0i),
+      .w31 = S(2) * dot(f.bivector, -m.e31, f.twisted, -t_e13, spin, y_e13, away, v_e013i * y_e0i),
+      .w12 = S(-2) * dot(f.bivector, m.e12, f.twisted, t_e12, spin, y_e12, away, v_e012i * y_e0i),
+      .v1 = S(-2) * dot(f.bivector, m.e1i, f.twisted, t_e1i, spin, y_e1i, away,
+                        dot(-v_e123i, y_e23, v_e012i, y_e2i, v_e013i, y_e3i)),
+      .v2 = S(-2) * dot(f.bivector, m.e2i, f.twisted, t_e2i, spin, y_e2i, away,
+                        dot(v_e123i, y_e13, -v_e012i, y_e1i, v_e023i, y_e3i)),
+      .v3 = S(-2) * dot(f.bivector, m.e3i, f.twisted, t_e3i, spin, y_e3i, away,
+                        dot(-v_e123i, y_e12, -v_e013i, y_e1i, -v_e023i, y_e2i)),
+      .d = S(2) * dot(f.bivector, m.e0i, f.twisted, -t_e0i, spin, y_e0i, away,
+                      dot(-v_e012i, y_e12, -v_e013i, y_e13, -v_e023i, y_e23))};
 }
 
 /// cayley: Rate -> Similarity

@@ -1210,7 +1210,7 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 44 mul, 28 add (22 fused), 1 bivector_logarithm.
+/// Cost: 110 mul, 84 add (60 fused), 1 planes_logarithm.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const S plus_0 = m.e12 - m.e34;
@@ -1220,30 +1220,55 @@ template <class S>
   const S minus_1 = m.e13 - m.e24;
   const S minus_2 = m.e14 + m.e23;
   const auto f =
-      scalar::bivector_logarithm(m.s, m.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
-                                 dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
-  return {
-      .e12 = dot(f.bivector, m.e12, f.twisted, -m.e1234 * m.e34),
-      .e13 = dot(f.bivector, m.e13, f.twisted, m.e1234 * m.e24),
-      .e14 = dot(f.bivector, m.e14, f.twisted, -m.e1234 * m.e23),
-      .e23 = dot(f.bivector, m.e23, f.twisted, -m.e1234 * m.e14),
-      .e24 = dot(f.bivector, m.e24, f.twisted, m.e1234 * m.e13),
-      .e34 = dot(f.bivector, m.e34, f.twisted, -m.e12 * m.e1234),
-      .e01 =
-          dot(f.bivector, m.e01, f.twisted, dot(-m.e0123, m.e23, -m.e0124, m.e24, -m.e0134, m.e34)),
-      .e02 =
-          dot(f.bivector, m.e02, f.twisted, dot(m.e0123, m.e13, m.e0124, m.e14, -m.e0234, m.e34)),
-      .e03 =
-          dot(f.bivector, m.e03, f.twisted, dot(-m.e0123, m.e12, m.e0134, m.e14, m.e0234, m.e24)),
-      .e04 = dot(f.bivector, m.e04, f.twisted,
-                 dot(-m.e0124, m.e12, -m.e0134, m.e13, -m.e0234, m.e23))};
+      scalar::planes_logarithm(m.s, m.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+                               dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
+  const S seeded_plus = plus_0 + f.seed_plus;
+  const S seeded_minus = minus_0 + f.seed_minus;
+  const S r_e12 = f.plus * seeded_plus + f.minus * seeded_minus;
+  const S r_e13 = f.plus * plus_1 + f.minus * minus_1;
+  const S r_e14 = f.plus * plus_2 + f.minus * minus_2;
+  const S r_e23 = f.minus * minus_2 - f.plus * plus_2;
+  const S r_e24 = f.plus * plus_1 - f.minus * minus_1;
+  const S r_e34 = f.minus * seeded_minus - f.plus * seeded_plus;
+  const S t_e01 = dot(m.e01, m.s, m.e02, m.e12, m.e03, m.e13, m.e04, m.e14, m.e0123, m.e23, m.e0124,
+                      m.e24, m.e0134, m.e34, m.e0234, m.e1234);
+  const S t_e02 = dot(-m.e01, m.e12, m.e02, m.s, m.e03, m.e23, m.e04, m.e24, -m.e0123, m.e13,
+                      -m.e0124, m.e14, -m.e0134, m.e1234, m.e0234, m.e34);
+  const S t_e03 = dot(-m.e01, m.e13, -m.e02, m.e23, m.e03, m.s, m.e04, m.e34, m.e0123, m.e12,
+                      m.e0124, m.e1234, -m.e0134, m.e14, -m.e0234, m.e24);
+  const S t_e04 = dot(-m.e01, m.e14, -m.e02, m.e24, -m.e03, m.e34, m.e04, m.s, -m.e0123, m.e1234,
+                      m.e0124, m.e12, m.e0134, m.e13, m.e0234, m.e23);
+  const S a_e12 = f.unit_plus * seeded_plus + f.unit_minus * seeded_minus;
+  const S a_e13 = f.unit_plus * plus_1 + f.unit_minus * minus_1;
+  const S a_e14 = f.unit_plus * plus_2 + f.unit_minus * minus_2;
+  const S a_e23 = f.unit_minus * minus_2 - f.unit_plus * plus_2;
+  const S a_e24 = f.unit_plus * plus_1 - f.unit_minus * minus_1;
+  const S a_e34 = f.unit_minus * seeded_minus - f.unit_plus * seeded_plus;
+  const S w_e02 = dot(-a_e12, t_e01, a_e23, t_e03, a_e24, t_e04);
+  const S w_e01 = dot(a_e12, t_e02, a_e13, t_e03, a_e14, t_e04);
+  const S w_e03 = dot(-a_e13, t_e01, -a_e23, t_e02, a_e34, t_e04);
+  const S w_e04 = dot(a_e14, t_e01, a_e24, t_e02, a_e34, t_e03);
+  return {.e12 = r_e12,
+          .e13 = r_e13,
+          .e14 = r_e14,
+          .e23 = r_e23,
+          .e24 = r_e24,
+          .e34 = r_e34,
+          .e01 = dot(f.along, t_e01, S(-1), dot(r_e12, t_e02, r_e13, t_e03, r_e14, t_e04),
+                     -f.across, dot(a_e12, w_e02, a_e13, w_e03, -a_e14, w_e04)),
+          .e02 = dot(f.along, t_e02, S(-1), dot(-r_e12, t_e01, r_e23, t_e03, r_e24, t_e04),
+                     -f.across, dot(-a_e12, w_e01, a_e23, w_e03, -a_e24, w_e04)),
+          .e03 = dot(f.along, t_e03, S(-1), dot(-r_e13, t_e01, -r_e23, t_e02, r_e34, t_e04),
+                     -f.across, dot(-a_e13, w_e01, -a_e23, w_e02, -a_e34, w_e04)),
+          .e04 = dot(f.along, t_e04, S(-1), dot(-r_e14, t_e01, -r_e24, t_e02, -r_e34, t_e03),
+                     -f.across, dot(-a_e14, w_e01, -a_e24, w_e02, -a_e34, w_e03))};
 }
 
 /// log: Rotor -> Rotation
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 24 mul, 16 add (10 fused), 1 bivector_logarithm.
+/// Cost: 18 mul, 18 add (4 fused), 1 planes_logarithm.
 template <class S>
 [[nodiscard]] constexpr Rotation<S> log(const Rotor<S>& r) noexcept {
   const S plus_0 = r.e12 - r.e34;
@@ -1253,14 +1278,17 @@ template <class S>
   const S minus_1 = r.e13 - r.e24;
   const S minus_2 = r.e14 + r.e23;
   const auto f =
-      scalar::bivector_logarithm(r.s, r.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
-                                 dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
-  return {.e12 = dot(f.bivector, r.e12, f.twisted, -r.e1234 * r.e34),
-          .e13 = dot(f.bivector, r.e13, f.twisted, r.e1234 * r.e24),
-          .e14 = dot(f.bivector, r.e14, f.twisted, -r.e1234 * r.e23),
-          .e23 = dot(f.bivector, r.e23, f.twisted, -r.e1234 * r.e14),
-          .e24 = dot(f.bivector, r.e24, f.twisted, r.e1234 * r.e13),
-          .e34 = dot(f.bivector, r.e34, f.twisted, -r.e12 * r.e1234)};
+      scalar::planes_logarithm(r.s, r.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+                               dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
+  const S seeded_plus = plus_0 + f.seed_plus;
+  const S seeded_minus = minus_0 + f.seed_minus;
+  const S r_e12 = f.plus * seeded_plus + f.minus * seeded_minus;
+  const S r_e13 = f.plus * plus_1 + f.minus * minus_1;
+  const S r_e14 = f.plus * plus_2 + f.minus * minus_2;
+  const S r_e23 = f.minus * minus_2 - f.plus * plus_2;
+  const S r_e24 = f.plus * plus_1 - f.minus * minus_1;
+  const S r_e34 = f.minus * seeded_minus - f.plus * seeded_plus;
+  return {.e12 = r_e12, .e13 = r_e13, .e14 = r_e14, .e23 = r_e23, .e24 = r_e24, .e34 = r_e34};
 }
 
 /// cayley: Bivector -> Motor

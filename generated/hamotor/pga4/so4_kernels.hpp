@@ -293,7 +293,7 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Cost: 30 mul, 16 add (10 fused), 1 bivector_logarithm.
+/// Cost: 24 mul, 18 add (4 fused), 1 planes_logarithm.
 template <class S>
 [[nodiscard]] constexpr so4::Rate<S> log(const Rotor<S>& r) noexcept {
   const S plus_0 = r.e12 - r.e34;
@@ -303,14 +303,22 @@ template <class S>
   const S minus_1 = r.e13 - r.e24;
   const S minus_2 = r.e14 + r.e23;
   const auto f =
-      scalar::bivector_logarithm(r.s, r.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
-                                 dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
-  return {.w12 = S(-2) * dot(f.bivector, r.e12, f.twisted, -r.e1234 * r.e34),
-          .w13 = S(-2) * dot(f.bivector, r.e13, f.twisted, r.e1234 * r.e24),
-          .w14 = S(-2) * dot(f.bivector, r.e14, f.twisted, -r.e1234 * r.e23),
-          .w23 = S(-2) * dot(f.bivector, r.e23, f.twisted, -r.e1234 * r.e14),
-          .w24 = S(-2) * dot(f.bivector, r.e24, f.twisted, r.e1234 * r.e13),
-          .w34 = S(-2) * dot(f.bivector, r.e34, f.twisted, -r.e12 * r.e1234)};
+      scalar::planes_logarithm(r.s, r.e1234, dot(plus_0, plus_0, plus_1, plus_1, plus_2, plus_2),
+                               dot(minus_0, minus_0, minus_1, minus_1, minus_2, minus_2));
+  const S seeded_plus = plus_0 + f.seed_plus;
+  const S seeded_minus = minus_0 + f.seed_minus;
+  const S r_e12 = f.plus * seeded_plus + f.minus * seeded_minus;
+  const S r_e13 = f.plus * plus_1 + f.minus * minus_1;
+  const S r_e14 = f.plus * plus_2 + f.minus * minus_2;
+  const S r_e23 = f.minus * minus_2 - f.plus * plus_2;
+  const S r_e24 = f.plus * plus_1 - f.minus * minus_1;
+  const S r_e34 = f.minus * seeded_minus - f.plus * seeded_plus;
+  return {.w12 = S(-2) * r_e12,
+          .w13 = S(-2) * r_e13,
+          .w14 = S(-2) * r_e14,
+          .w23 = S(-2) * r_e23,
+          .w24 = S(-2) * r_e24,
+          .w34 = S(-2) * r_e34};
 }
 
 /// cayley: Rate -> Rotor

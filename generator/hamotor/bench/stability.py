@@ -45,7 +45,7 @@ from hamotor.run.simulation import Simulation, load
 from hamotor.scene import METHODS, Promise
 
 EDGES: Final = Path(__file__).resolve().parents[3] / "tests" / "bench" / "stability" / "edges.cpp"
-EDGE_BOUND: Final = 4.0
+EDGE_BOUND: Final = 8.0
 CASES: Final = Path(__file__).resolve().parents[2] / "scenes" / "hard"
 QUICK: Final = ("rkmk4", "taylor", "splitting2", "splitting8", "gauss8", "closed_form")
 """One method of each family."""

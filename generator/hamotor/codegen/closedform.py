@@ -234,35 +234,138 @@ def log_kernel(
     rho = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(rho.keys() - {0}) or any(grade(b) not in (0, 4) for b in square):
         raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
-    twisted = _twisted(algebra, quad, bivector)
     negated = {b: poly.scaled(p, -1) for b, p in square.items()}
     planes = _on_planes(algebra, writer, negated, quad)
-    c = polynomial_expression(value[0])
     if planes:
-        q = polynomial_expression(quad[planes.blade])
-        arguments: tuple[Expression, ...] = (c, q, planes.plus, planes.minus)
+        out = _log_on_planes(algebra, writer, value, planes)
     else:
-        number_part, root = (polynomial_expression(x.get(0, {})) for x in (square, rho))
-        arguments = (c, number_part, root)
-        if _may_be_isoclinic(algebra, quad):
-            # <R>₂² = S + 2 c <R>₄
-            number_part, root = writer.let("square", number_part), writer.let("rho", root)
-            twisted = _named(algebra, writer, "t", twisted)
-            twice = writer.let("twice", Product(number(2), c))
-            omega = writer.let("omega", Product(Product(twice, twice), root))
-            near = _isoclinic(algebra, writer, bivector, number_part, omega, twice, twisted)
-            arguments = (c, number_part, root, near.applies, near.square)
-    writer.let("f", Call("bivector_logarithm", arguments))
-    terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("f.bivector"), bivector)]
-    if twisted:
-        terms.append((Name("f.twisted"), twisted))
-    out = _combination(terms, {})
+        out = _log_by_square(algebra, writer, value, square.get(0, {}), rho.get(0, {}))
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = (
         "Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a",
         "bivector (not every unit versor is: −T, T a null rotation, is not).",
     )
     return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, notes)
+
+
+def _log_by_square(
+    algebra: Algebra,
+    writer: Writer,
+    value: PolynomialMultivector,
+    square: Polynomial,
+    rho: Polynomial,
+) -> dict[Blade, Expression]:
+    """From <R>₀, S = <<R>₂²>₀ and ρ = <R>₄²."""
+    quad = {b: p for b, p in value.items() if grade(b) == 4}
+    bivector = {b: p for b, p in value.items() if grade(b) == 2}
+    twisted = _twisted(algebra, quad, bivector)
+    c, number_part, root = (polynomial_expression(p) for p in (value[0], square, rho))
+    arguments: tuple[Expression, ...] = (c, number_part, root)
+    # planes that are not each other's dual: rounding of one is no turn in the other
+    commuting = not all(algebra.blade_product(b, b).get(0) for b in quad) or len(quad) > 1
+    if commuting:
+        twisted = _named(algebra, writer, "t", twisted)
+    if _may_be_isoclinic(algebra, quad):
+        # <R>₂² = S + 2 c <R>₄
+        number_part, root = writer.let("square", number_part), writer.let("rho", root)
+        twice = writer.let("twice", Product(number(2), c))
+        omega = writer.let("omega", Product(Product(twice, twice), root))
+        near = _isoclinic(algebra, writer, bivector, number_part, omega, twice, twisted)
+        arguments = (c, number_part, root, near.applies, near.square)
+    writer.let("f", Call("turned_logarithm" if commuting else "bivector_logarithm", arguments))
+    terms: list[tuple[Expression, PolynomialMultivector]] = [(Name("f.bivector"), bivector)]
+    if twisted:
+        terms.append((Name("f.twisted"), twisted))
+    if commuting:
+        terms += _turned_plane(algebra, writer, bivector, twisted)
+    return _combination(terms, {})
+
+
+def _turned_plane(
+    algebra: Algebra,
+    writer: Writer,
+    bivector: PolynomialMultivector,
+    twisted: PolynomialMultivector,
+) -> list[tuple[Expression, PolynomialMultivector]]:
+    """f.turn times the unit of y, freed of what rounding left of the plane that commutes with it.
+
+    With 2 V = <y²>₄ and y² ≈ −|y|² that is y + <y V>₂ / |y|².
+    """
+    parts: list[tuple[Expression, PolynomialMultivector]] = [
+        (Name("f.part"), bivector),
+        (Name("f.part_twisted"), twisted),
+    ]
+    y: PolynomialMultivector = {}
+    for blade, x in sorted(_combination(parts, {}).items()):
+        writer.let(name := f"y_{algebra.blade_name(blade)}", x)
+        y[blade] = {(name,): 1}
+    square = poly.apply_bilinear(algebra.geometric, y, y)
+    quad = {b: poly.scaled(p, ratio(1, 2)) for b, p in square.items() if b}
+    twice = _twisted(algebra, y, _named(algebra, writer, "v", quad))
+    length2 = writer.let("length2", Call("abs", (polynomial_expression(square[0]),)))
+    turn, zero = Name("f.turn"), number(0)
+    spin = writer.let("spin", Select(turn, Quotient(turn, Call("sqrt", (length2,))), zero))
+    away = writer.let("away", Select(turn, Quotient(spin, length2), zero))
+    return [(spin, y), (away, twice)]
+
+
+def _log_on_planes(
+    algebra: Algebra, writer: Writer, value: PolynomialMultivector, planes: Planes
+) -> dict[Blade, Expression]:
+    """Where J = 1 and where J = −1 by themselves, and then what e0 brings: M = (1 + t) R.
+
+    With exp L = R, L = a A + b B in planes A, B with the larger half angle a, that is
+    b cot b t − ½ [L, t] + (a cot a − b cot b) t_A; t_A = −A × (A × t) is the part of t in A, of
+    which nothing else is left by rounding.
+    """
+    q = polynomial_expression(value[planes.blade])
+    sides = (planes.plus, planes.minus)
+    writer.let("f", Call("planes_logarithm", (polynomial_expression(value[0]), q, *sides)))
+    pairs = planes.pairs
+    plus: list[Expression] = [Name(f"plus_{i}") for i in range(len(pairs))]
+    minus: list[Expression] = [Name(f"minus_{i}") for i in range(len(pairs))]
+    plus[0] = writer.let("seeded_plus", Sum(plus[0], Name("f.seed_plus")))
+    minus[0] = writer.let("seeded_minus", Sum(minus[0], Name("f.seed_minus")))
+
+    def joined(by_plus: str, by_minus: str) -> dict[str, Expression]:
+        names: dict[str, Expression] = {}
+        for pair, high, low in zip(pairs, plus, minus, strict=True):
+            above, below = Product(Name(by_plus), high), Product(Name(by_minus), low)
+            other = Negative(below)
+            names[pair.x] = Sum(above, below)
+            names[pair.y] = Sum(above, other) if pair.sign > 0 else Sum(below, Negative(above))
+        return names
+
+    def bound(prefix: str, names: Mapping[str, Expression]) -> PolynomialMultivector:
+        found: PolynomialMultivector = {}
+        for blade, p in value.items():
+            if grade(blade) == 2 and (factor := one_name(p))[1] in names:
+                sign, of = factor
+                writer.let(name := f"{prefix}_{algebra.blade_name(blade)}", names[of])
+                found[blade] = {(name,): sign}
+        return found
+
+    rotation = bound("r", joined("f.plus", "f.minus"))
+    out = {blade: polynomial_expression(p) for blade, p in rotation.items()}
+    kept = {0, planes.blade, *rotation}
+    rotor = {b: p for b, p in value.items() if b in kept}
+    moved = {b: p for b, p in value.items() if b not in kept}
+    if not moved:
+        return out
+
+    def cross(a: PolynomialMultivector, b: PolynomialMultivector) -> PolynomialMultivector:
+        return poly.apply_bilinear(algebra.commutator, a, b)
+
+    t = poly.apply_bilinear(algebra.geometric, moved, reversed_value(rotor))
+    t = _named(algebra, writer, "t", {b: p for b, p in t.items() if grade(b) == 2})
+    plane = bound("a", joined("f.unit_plus", "f.unit_minus"))
+    turned = _named(algebra, writer, "w", cross(plane, t))
+    parts: list[tuple[Expression, PolynomialMultivector]] = [
+        (Name("f.along"), t),
+        (number(-1), cross(rotation, t)),
+        (Negative(Name("f.across")), cross(plane, turned)),
+    ]
+    return out | _combination(parts, {})
 
 
 def cayley_kernel(
@@ -324,12 +427,23 @@ def cayley_kernel(
 
 
 @dataclass(frozen=True)
+class Pair:
+    """Names of dual components of a bivector: x + `sign` y where J = 1, x − `sign` y elsewhere."""
+
+    x: str
+    y: str
+    sign: int
+
+
+@dataclass(frozen=True)
 class Planes:
     """What an element of grades 0 and 4 is where J = 1 and where J = −1; J: `blade`, J² = 1."""
 
     blade: Blade
     plus: Expression
     minus: Expression
+    pairs: tuple[Pair, ...] = ()
+    """What it is the square of, if it is one."""
 
     @property
     def product(self) -> Expression:
@@ -384,7 +498,8 @@ def _on_planes(
             terms.append((total if sign > 0 else negative(total), total))
         sides.append(sum_of_products(terms))
     plus, minus = sides
-    return Planes(blade, plus, minus)
+    dual = tuple(Pair(x, y, 1 if twice > 0 else -1) for x, y, _, twice in pairs)
+    return Planes(blade, plus, minus, dual)
 
 
 def _one_plus_versor(
@@ -466,7 +581,7 @@ def cayley_inverse_kernel(
             writer.let(f"inverse_{side}", Quotient(ONE, x))
             for side, x in (("plus", planes.plus), ("minus", planes.minus))
         ]
-        linear = Planes(planes.blade, *sides).mean(writer, "linear")
+        linear = Planes(planes.blade, sides[0], sides[1]).mean(writer, "linear")
         quad = _times_name(algebra, writer, "q", quad, "inverse_plus")
         inverse = sides[1]
     else:

@@ -36,7 +36,10 @@ functions of the runtime are longer than their count."""
 PACKED = "if constexpr (lanes::packed<S>) {"
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
-    "bivector_logarithm": "hamotor/bivector_logarithm.hpp",
+    **dict.fromkeys(
+        ("bivector_logarithm", "planes_logarithm", "turned_logarithm"),
+        "hamotor/bivector_logarithm.hpp",
+    ),
     **dict.fromkeys(cpp.RATE_JACOBIANS, "hamotor/rate_jacobian.hpp"),
 }
 """Functions that stand in a header of their own."""

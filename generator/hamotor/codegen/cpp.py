@@ -35,6 +35,8 @@ PAIRS = {
     *RATE_JACOBIANS,
     "bivector_exponential",
     "bivector_logarithm",
+    "planes_logarithm",
+    "turned_logarithm",
     "compensated_dot_pair",
     "double_word_sqrt",
     "double_word_ratio",

@@ -149,17 +149,93 @@ template <class S>
   return bivector_logarithm(c, square, rho, S(0), S(0));
 }
 
-/// The same for algebras with a blade J of grade 4, J² = 1: of C = c + q J + … and, without
-/// cancellation between S and W, what −<R>₂² = 1 − C² is where J = 1 and where J = −1.
+/// log R = bivector <R>₂ + twisted <<R>₄ <R>₂>₂ + turn × the unit of y, y = part <R>₂ +
+/// part_twisted <<R>₄ <R>₂>₂ the plane that turns by nearly π; all three 0 where none does.
 template <class S>
-[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& q, const S& plus,
-                                                      const S& minus) noexcept {
-  const S square = S(-0.5) * (plus + minus);
-  if (c > S(0) && abs(square) + S(2) * abs(q) < S(0.25)) {
-    const S rho = q * q;
-    return detail::logarithm_series((rho - square) / (S(1) + c), S(-1), rho);
+struct TurnedLogarithm {
+  S bivector;
+  S twisted;
+  S turn;
+  S part;
+  S part_twisted;
+};
+
+/// The numbers of log R also where one plane turns by a half angle b near π beside a boost, a null
+/// rotation or a smaller rotation.
+///
+/// There <R>₂ holds sin b of that plane and all of the other, so that b / sin b would multiply the
+/// rounding of the other.  So log R = log(−R) + π × the unit of that plane, of which no number is
+/// large.
+template <class S>
+[[nodiscard]] TurnedLogarithm<S> turned_logarithm(const S& c, const S& square, const S& rho,
+                                                  const S& isoclinic, const S& near) noexcept {
+  // <R>₂² is `turning` where R turns and `other` in the other plane; their product is c² ρ
+  const S product = c * c * rho;
+  const S spread = sqrt(abs(mul_add(square, square, S(-4) * product)));
+  const S larger = S(0.5) * (square < S(0) ? square - spread : square + spread);
+  const S smaller = abs(larger) > S(0) ? S(product / larger) : S(0);
+  const S turning = square < S(0) ? larger : smaller;
+  const S other = square < S(0) ? smaller : larger;
+  const bool apart = S(4) * other > turning;
+  if (!(c < S(0) && turning < S(0) && -turning < c * c && apart)) {
+    const auto f = bivector_logarithm(c, square, rho, isoclinic, near);
+    return {f.bivector, f.twisted, S(0), S(0), S(0)};
   }
-  return detail::interpolated_logarithm(c, q, square, plus, minus);
+  const auto f = bivector_logarithm(S(-c), square, rho, isoclinic, near);
+  const S unit = S(1) / ((turning - other) * sqrt(-turning));
+  return {-f.bivector, f.twisted, pi<S>(), turning * unit, -c * unit};
+}
+
+/// The same where √ρ is 0 or no number.
+template <class S>
+[[nodiscard]] TurnedLogarithm<S> turned_logarithm(const S& c, const S& square,
+                                                  const S& rho) noexcept {
+  return turned_logarithm(c, square, rho, S(0), S(0));
+}
+
+/// The numbers of log R for algebras with a blade J of grade 4, J² = 1, R = c + q J + ….
+///
+/// Where J = ±1, R turns by the half angle θ = a ± b about a direction of its own.  `plus` and
+/// `minus` are ½ θ / sin θ, the factors of <R>₂ there; `unit_plus` and `unit_minus` are ½ / sin θ.
+/// Where R is −1 the direction is any: the `seed` is 1, otherwise 0.  `along` is b cot b and
+/// `across` is a cot a − b cot b.
+template <class S>
+struct PlanesLogarithm {
+  S plus;
+  S minus;
+  S unit_plus;
+  S unit_minus;
+  S seed_plus;
+  S seed_minus;
+  S along;
+  S across;
+};
+
+/// From c, q and what −<R>₂² is where J = 1 and where J = −1, without cancellation between them.
+template <class S>
+[[nodiscard]] PlanesLogarithm<S> planes_logarithm(const S& c, const S& q, const S& plus,
+                                                  const S& minus) noexcept {
+  struct Turn {
+    S angle, ratio, unit, seed;
+  };
+  const auto turn = [](const S& sine_squared, const S& cosine) -> Turn {
+    const S half(0.5);
+    const S sine = sqrt(sine_squared);
+    if (sine > S(0)) {
+      const S angle = atan2(sine, cosine);
+      return {angle, half * (angle / sine), half / sine, S(0)};
+    }
+    if (cosine < S(0)) return {pi<S>(), half * pi<S>(), half, S(1)};
+    return {S(0), half, S(0), S(0)};
+  };
+  const auto cotangent = [](const S& angle) -> S {
+    return abs(angle) > S(0) ? S(angle / tan(angle)) : S(1);
+  };
+  const Turn p = turn(plus, c + q);
+  const Turn m = turn(minus, c - q);
+  const S along = cotangent(S(0.5) * (p.angle - m.angle));
+  const S across = cotangent(S(0.5) * (p.angle + m.angle)) - along;
+  return {p.ratio, m.ratio, p.unit, m.unit, p.seed, m.seed, along, across};
 }
 
 }  // namespace hamotor::scalar
