@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from hamotor.mechanics import language
     from hamotor.run.comparison import Comparison, compare
     from hamotor.run.dataset import read_trajectory
+    from hamotor.run.ensemble_run import (
+        EnsembleFailed,
+        EnsembleInterrupted,
+        EnsembleRun,
+        open_ensemble,
+        run_ensemble,
+    )
     from hamotor.run.result import Run, RunFailed, RunInterrupted, open_run
     from hamotor.run.simulation import Simulation, from_hamiltonian, load
     from hamotor.scene.building import body
@@ -33,6 +40,11 @@ _HOMES = {
     "Comparison": "hamotor.run.comparison",
     "compare": "hamotor.run.comparison",
     "read_trajectory": "hamotor.run.dataset",
+    "EnsembleFailed": "hamotor.run.ensemble_run",
+    "EnsembleInterrupted": "hamotor.run.ensemble_run",
+    "EnsembleRun": "hamotor.run.ensemble_run",
+    "open_ensemble": "hamotor.run.ensemble_run",
+    "run_ensemble": "hamotor.run.ensemble_run",
     "Run": "hamotor.run.result",
     "RunFailed": "hamotor.run.result",
     "RunInterrupted": "hamotor.run.result",
@@ -45,6 +57,9 @@ _HOMES = {
 
 __all__ = [
     "Comparison",
+    "EnsembleFailed",
+    "EnsembleInterrupted",
+    "EnsembleRun",
     "HamotorError",
     "NumericsError",
     "Run",
@@ -59,8 +74,10 @@ __all__ = [
     "from_hamiltonian",
     "language",
     "load",
+    "open_ensemble",
     "open_run",
     "read_trajectory",
+    "run_ensemble",
 ]
 
 

@@ -18,6 +18,7 @@ from hamotor.errors import CheckFailed, HamotorError, UsageError, suggest
 
 if TYPE_CHECKING:
     from hamotor.codegen.tree import Difference
+    from hamotor.run.ensemble_run import EnsembleRun
     from hamotor.run.result import Run
 
 Command = Callable[[argparse.Namespace], int]
@@ -43,19 +44,23 @@ examples:
   ./hamotor run tumble --method rkmk4 --step 0.001 --end 100 --every 100
   ./hamotor run spring_pendulum --tolerance 1e-10 --csv --out runs/pendulum
   ./hamotor run heavy_top --end -5 --at=-1,-2.5,-5
+  ./hamotor run tumbling_debris --ensemble 100000 --keep 0,7
 
 The folder then holds run.json (the account of the run), trajectory/ (Parquet), path.png,
-conserved.png and, where events of the scene happened, events.parquet.  An earlier run there is
-replaced, anything else is left alone.
+conserved.png and, where events of the scene happened, events.parquet; of an ensemble run.json,
+statistics.parquet, states/, and where there are any failures.parquet and members/.  An earlier run
+there is replaced, anything else is left alone.
 """
 
 _BENCHMARKS = ("kernels", "steps", "precision", "stability")
 _COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test", "bench")
-_LATER_RUN_OPTIONS = {
-    "ensemble": "--ensemble",
-    "seed": "--seed",
-    "threads": "--threads",
-    "engine": "--engine",
+_ENSEMBLE_OPTIONS = ("seed", "threads", "member", "keep", "engine", "scheduler")
+_NOT_FOR_ENSEMBLES = {
+    "tolerance": "all members take the same steps; give --step",
+    "local_tolerance": "all members take the same steps; give --step",
+    "digits": "members are stepped in double or float",
+    "kernels": "only generated kernels step members",
+    "representation": "only motors step members",
 }
 
 
@@ -264,8 +269,22 @@ def _add_run(parser: _Parser) -> None:
         default="ga",
         help="ga|matrix: motors, or the classical R, x, Π, P (SE(3), SO(3), SE(2))",
     )
-    for option in _LATER_RUN_OPTIONS.values():
-        parser.add_argument(option, nargs="?", const=True, help=argparse.SUPPRESS)
+    many = parser.add_argument_group("many members of a scene, started as its [ensemble] says")
+    many.add_argument("--ensemble", metavar="N", type=_count, help="how many")
+    many.add_argument("--seed", metavar="S", type=_whole_number, help="of the random numbers")
+    many.add_argument("--threads", metavar="T", type=_count, help="default: one for each core")
+    many.add_argument(
+        "--keep", metavar="K1,K2,...", type=_whole_numbers, help="members whose rows are written"
+    )
+    many.add_argument(
+        "--member", metavar="K", type=_whole_number, help="this one alone: the same bits as in all"
+    )
+    many.add_argument(
+        "--engine", metavar="E", choices=("local", "dask"), help="local|dask: who computes"
+    )
+    many.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of dask; left out: processes on this machine"
+    )
 
 
 def _add_generate(parser: _Parser) -> None:
@@ -325,12 +344,6 @@ def _starter_text(parsed: argparse.Namespace) -> str:
     )
 
 
-def _refuse_later_options(parsed: argparse.Namespace, later: dict[str, str]) -> None:
-    for name, option in later.items():
-        if getattr(parsed, name) is not None:
-            raise UsageError(f"{option} is not in this version yet.")
-
-
 def _positive(text: str) -> float:
     number = _finite(text)
     if number <= 0:
@@ -355,6 +368,10 @@ def _finite(text: str) -> float:
     return number
 
 
+def _whole_numbers(text: str) -> list[int]:
+    return [_whole_number(word) for word in text.split(",")]
+
+
 def _times(text: str) -> list[float]:
     return [_finite(word) for word in text.split(",")]
 
@@ -370,7 +387,11 @@ def _count(text: str) -> int:
 
 
 def _run(parsed: argparse.Namespace) -> int:
-    _refuse_later_options(parsed, _LATER_RUN_OPTIONS)
+    if parsed.ensemble is not None:
+        return _run_ensemble(parsed)
+    for option in _ENSEMBLE_OPTIONS:
+        if getattr(parsed, option) is not None:
+            raise UsageError(f"--{option} goes with --ensemble N.")
     from hamotor.run.result import RunFailed, RunInterrupted
     from hamotor.run.simulation import load
 
@@ -407,7 +428,49 @@ def _run(parsed: argparse.Namespace) -> int:
     return code
 
 
-def _print_run(run: Run, *, as_json: bool) -> None:
+def _run_ensemble(parsed: argparse.Namespace) -> int:
+    defaults = {"kernels": "generated", "representation": "ga"}
+    for name, why in _NOT_FOR_ENSEMBLES.items():
+        if getattr(parsed, name) not in {None, defaults.get(name)}:
+            raise UsageError(f"--{name.replace('_', '-')} is not for ensembles: {why}.")
+    from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, run_ensemble
+    from hamotor.run.simulation import load
+
+    simulation = load(parsed.scene)
+    code = 0
+    try:
+        run = run_ensemble(
+            simulation,
+            parsed.ensemble,
+            seed=parsed.seed,
+            member=parsed.member,
+            keep=parsed.keep,
+            threads=parsed.threads,
+            engine=parsed.engine or "local",
+            scheduler=parsed.scheduler,
+            end=parsed.end,
+            step=parsed.step,
+            method=parsed.method,
+            every=parsed.every,
+            times=parsed.at,
+            interval=parsed.interval,
+            time_limit=parsed.time_limit,
+            scalar=parsed.scalar,
+            out=parsed.out or str(Path("runs") / f"{simulation.name}_ensemble"),
+            csv=parsed.csv,
+            progress=True,
+        )
+    except EnsembleFailed as failure:
+        run, code = failure.run, failure.exit_code
+        _say(f"hamotor: error: {failure}")
+    except EnsembleInterrupted as interruption:
+        run, code = interruption.run, 130
+        _say("hamotor: interrupted; what was computed is kept")
+    _print_run(run, as_json=parsed.json)
+    return code
+
+
+def _print_run(run: Run | EnsembleRun, *, as_json: bool) -> None:
     if as_json:
         from hamotor.run.report import to_json
 

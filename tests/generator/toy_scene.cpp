@@ -3,6 +3,7 @@
 //
 // FAIL_AT n        the state becomes infinite in step n
 // OVERFLOW_AT n    an observed quantity, not the state, becomes infinite after step n
+// FAIL_MEMBER n    members of an ensemble with a negative rate fail in step n
 // SLEEP_US n       every step takes at least n microseconds
 #include <chrono>
 #include <cmath>
@@ -10,6 +11,7 @@
 #include <cstring>
 #include <limits>
 #include <thread>
+#include <vector>
 
 #ifndef FAIL_AT
 #define FAIL_AT -1
@@ -19,6 +21,9 @@
 #endif
 #ifndef SLEEP_US
 #define SLEEP_US 0
+#endif
+#ifndef FAIL_MEMBER
+#define FAIL_MEMBER -1
 #endif
 #ifndef ABI
 #define ABI "2"
@@ -112,7 +117,8 @@ EXPORT const char* hamotor_describe() {
   {"name":"spatial_momentum.e12","column":"spatial_momentum.e12",
    "norm":["spatial_momentum.e12"],"scale":1},
   {"name":"spatial_momentum.e02","column":"spatial_momentum.e02",
-   "norm":["spatial_momentum.e02"],"scale":0}], "events": []})";
+   "norm":["spatial_momentum.e02"],"scale":0}], "events": [],
+ "ensemble": {"lanes": 1, "isa": "toy", "parameters": []}})";
 }
 
 EXPORT void* hamotor_start(const char* method, double time, double step, double,
@@ -181,3 +187,66 @@ EXPORT std::int32_t hamotor_failure(const void* handle, std::int64_t* component)
 }
 
 EXPORT void hamotor_stop(void* handle) { delete static_cast<Run*>(handle); }
+
+// Many of them, one after the other.
+namespace {
+
+struct Member {
+  Run* run;
+  bool failed;
+};
+
+using Members = std::vector<Member>;
+
+}  // namespace
+
+EXPORT void* hamotor_ensemble_start(const char* method, double time, double step, double tolerance,
+                                    std::int64_t count, const double* states, const double*,
+                                    std::int32_t, std::int32_t) {
+  auto* members = new Members;
+  for (std::int64_t k = 0; k < count; ++k) {
+    void* run = hamotor_start(method, time, step, tolerance, states + 14 * k);
+    if (run == nullptr) return nullptr;
+    members->push_back({static_cast<Run*>(run), false});
+  }
+  return members;
+}
+
+EXPORT std::int64_t hamotor_ensemble_advance(void* handle, std::int64_t steps) {
+  std::int64_t alive = 0;
+  for (Member& member : *static_cast<Members*>(handle)) {
+    for (std::int64_t k = 0; k < steps && !member.failed; ++k) {
+      member.failed = member.run->index + 1 == FAIL_MEMBER && member.run->rate < 0;
+      if (!member.failed) hamotor_advance(member.run, 1, 1, nullptr);
+    }
+    alive += member.failed ? 0 : 1;
+  }
+  return alive;
+}
+
+EXPORT void hamotor_ensemble_observe(const void* handle, std::int64_t first, std::int64_t count,
+                                     double* rows) {
+  const Members& members = *static_cast<const Members*>(handle);
+  for (std::int64_t k = 0; k < count; ++k) write_row(*members[first + k].run, rows + columns * k);
+}
+
+EXPORT void hamotor_ensemble_states(const void* handle, double* states) {
+  for (const Member& member : *static_cast<const Members*>(handle)) {
+    hamotor_state(member.run, states);
+    states += 14;
+  }
+}
+
+EXPORT void hamotor_ensemble_failures(const void* handle, std::int32_t* failure,
+                                      std::int64_t* step) {
+  for (const Member& member : *static_cast<const Members*>(handle)) {
+    *failure++ = member.failed ? 1 : 0;
+    *step++ = member.run->index;
+  }
+}
+
+EXPORT void hamotor_ensemble_stop(void* handle) {
+  auto* members = static_cast<Members*>(handle);
+  for (const Member& member : *members) hamotor_stop(member.run);
+  delete members;
+}

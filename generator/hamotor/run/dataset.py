@@ -34,6 +34,16 @@ EVENTS = "events.parquet"
 EVENTS_CSV = "events.csv"
 REPORT = "run.json"
 PICTURES = ("path.png", "conserved.png")
+STATISTICS = "statistics.parquet"
+STATISTICS_CSV = "statistics.csv"
+FAILURES = "failures.parquet"
+STATES = "states"
+MEMBERS = "members"
+PARTS = ".parts-"
+"""Parts of an ensemble that other processes compute lie in folders whose names begin so."""
+_CONTENTS = (
+    TRAJECTORY, CSV, EVENTS, EVENTS_CSV, STATISTICS, STATISTICS_CSV, FAILURES, STATES, MEMBERS,
+)  # fmt: skip
 
 CONVENTION = (
     "SI units. X_world = M X_body M~, dM/dt = M B. Rates and momenta are physical, in the body "
@@ -194,12 +204,12 @@ def _arrow_table(rows: Rows, description: Description) -> pa.Table:
         )
         for column in description.columns
     ]
-    schema = pa.schema(fields, metadata=_schema_metadata(description))
+    schema = pa.schema(fields, metadata=schema_metadata(description))
     arrays = [pa.array(np.ascontiguousarray(column)) for column in rows.T]
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
-def _schema_metadata(description: Description) -> dict[str, str]:
+def schema_metadata(description: Description) -> dict[str, str]:
     return {
         "hamotor.scene": description.scene,
         "hamotor.algebra": description.algebra,
@@ -316,7 +326,9 @@ class RunFolder:
         if not self.path.is_dir():
             raise UsageError(f"--out {self.path}: a file of this name exists; name a folder.")
         foreign = sorted(
-            entry.name for entry in self.path.iterdir() if not entry.name.startswith(_STAGING)
+            entry.name
+            for entry in self.path.iterdir()
+            if not entry.name.startswith((_STAGING, PARTS))
         )
         if foreign and not is_run(self.path):
             shown = ", ".join(foreign[:3]) + (", …" if len(foreign) > 3 else "")
@@ -327,7 +339,11 @@ class RunFolder:
             )
 
     def new_recorder(self, description: Description, *, csv: bool) -> DiskRecorder:
-        """A recorder into the staging folder.  A run may have several and publish one."""
+        """A recorder into a staging folder.  A run may have several and publish one."""
+        return DiskRecorder(self.new_staging(), description, csv=csv)
+
+    def new_staging(self) -> Path:
+        """A new folder whose files may be published."""
         folder = self._staging / str(self._recordings)
         if not self._recordings:
             self._remove_abandoned()
@@ -336,22 +352,22 @@ class RunFolder:
             folder.mkdir(parents=True)
         except OSError as problem:
             raise UsageError(f"--out {self.path}: cannot be written: {problem}") from problem
-        return DiskRecorder(folder, description, csv=csv)
+        return folder
 
-    def publish(self, recorder: DiskRecorder, report: str) -> None:
-        """Put the recorder's rows and `run.json` in the place of an earlier run's files.
+    def publish(self, folder: Path, report: str) -> None:
+        """Put the files of a staging folder and `run.json` in the place of an earlier run's.
 
         Files that no run writes are left alone.
         """
         earlier = self._staging / "earlier"
         earlier.mkdir()
-        for name in (REPORT, TRAJECTORY, CSV, EVENTS, EVENTS_CSV, *PICTURES):
+        for name in (REPORT, *_CONTENTS, *PICTURES):
             if (self.path / name).exists():
                 (self.path / name).rename(earlier / name)
-        for name in (TRAJECTORY, CSV, EVENTS, EVENTS_CSV):
-            if (recorder.folder / name).exists():
-                (recorder.folder / name).rename(self.path / name)
-        unfinished = recorder.folder / REPORT
+        for name in _CONTENTS:
+            if (folder / name).exists():
+                (folder / name).rename(self.path / name)
+        unfinished = folder / REPORT
         unfinished.write_text(report, encoding="utf-8")
         unfinished.rename(self.path / REPORT)
         self.abandon()

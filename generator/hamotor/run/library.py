@@ -77,6 +77,14 @@ class Event:
 
 
 @dataclass(frozen=True)
+class EnsembleDescription:
+    """How a library steps many members: so many lanes at once, by these instructions."""
+
+    lanes: int
+    isa: str
+
+
+@dataclass(frozen=True)
 class Description:
     """What `hamotor_describe` says about a compiled scene."""
 
@@ -97,6 +105,8 @@ class Description:
     columns: tuple[Column, ...]
     conserved: tuple[Conserved, ...]
     events: tuple[Event, ...]
+    ensemble: EnsembleDescription | None = None
+    """None where the library was not compiled for ensembles."""
 
     @property
     def is_wide(self) -> bool:
@@ -173,6 +183,9 @@ def describe(text: str) -> Description:
             events=tuple(
                 Event(e["name"], e["direction"], bool(e["stops"])) for e in said["events"]
             ),
+            ensemble=EnsembleDescription(int(many["lanes"]), many["isa"])
+            if (many := said.get("ensemble"))
+            else None,
         )
         description.state_columns()
         for quantity in description.conserved:
@@ -193,7 +206,7 @@ class SceneLibrary:
         self.path = path
         try:
             self._c = ctypes.CDLL(str(path.resolve()))
-            self._bind()
+            self._bind_runs()
         except OSError as problem:
             raise ToolError(f"cannot load the compiled scene: {problem}") from problem
         except AttributeError as problem:
@@ -202,8 +215,10 @@ class SceneLibrary:
             ) from problem
         said = self._c.hamotor_describe()
         self.description = describe(said.decode("utf-8") if said else "")
+        if self.description.ensemble is not None:
+            self._bind_ensembles()
 
-    def _bind(self) -> None:
+    def _bind_runs(self) -> None:
         numbers = ctypes.POINTER(ctypes.c_double)
         run = ctypes.c_void_p
         whole = ctypes.c_int64
@@ -223,6 +238,27 @@ class SceneLibrary:
             "hamotor_failure": (ctypes.c_int32, [run, ctypes.POINTER(whole)]),
             "hamotor_stop": (None, [run]),
         }
+        self._bind(signatures)
+
+    def _bind_ensembles(self) -> None:
+        numbers, run, whole = ctypes.POINTER(ctypes.c_double), ctypes.c_void_p, ctypes.c_int64
+        name, number, count = ctypes.c_char_p, ctypes.c_double, ctypes.c_int32
+        start = [name, number, number, number, whole, numbers, numbers, count, count]
+        self._bind(
+            {
+                "hamotor_ensemble_start": (run, start),
+                "hamotor_ensemble_advance": (whole, [run, whole]),
+                "hamotor_ensemble_observe": (None, [run, whole, whole, numbers]),
+                "hamotor_ensemble_states": (None, [run, numbers]),
+                "hamotor_ensemble_failures": (
+                    None,
+                    [run, ctypes.POINTER(count), ctypes.POINTER(whole)],
+                ),
+                "hamotor_ensemble_stop": (None, [run]),
+            }
+        )
+
+    def _bind(self, signatures: Mapping[str, tuple[Any, list[Any]]]) -> None:
         for name, (result, arguments) in signatures.items():
             function = getattr(self._c, name)
             function.restype, function.argtypes = result, arguments
@@ -261,6 +297,23 @@ class SceneLibrary:
             raise ToolError(f'the compiled scene would not start method "{method}"')
         return LiveRun(self._c, handle, self.description)
 
+    def start_ensemble(self, method: str, *, step: float, states: Rows) -> LiveEnsemble | None:
+        """Begin a run of every row of `states`, shape (members, state_size), at t = 0.
+
+        None for a method that the library has no ensembles of.
+        """
+        size = self.description.state_size
+        if states.ndim != 2 or states.shape[1] != size or self.description.ensemble is None:
+            raise ToolError(
+                f"the compiled scene wants states of shape (members, {size}), not {states.shape}, "
+                "and to be compiled for ensembles."
+            )
+        initial = np.ascontiguousarray(states, dtype=np.float64)
+        handle = self._c.hamotor_ensemble_start(
+            method.encode(), 0.0, step, 0.0, len(initial), _pointer(initial), None, 1, 0
+        )
+        return LiveEnsemble(self._c, handle, self.description, len(initial)) if handle else None
+
 
 def check_method(method: str, methods: Mapping[str, int]) -> None:
     """Raise UsageError unless the scene offers this method."""
@@ -269,6 +322,53 @@ def check_method(method: str, methods: Mapping[str, int]) -> None:
         raise UsageError(
             f'unknown method "{method}"; this scene offers {allowed}.{suggest(method, methods)}'
         )
+
+
+class LiveEnsemble:
+    """Many runs of one scene inside the library, side by side.  A context manager."""
+
+    def __init__(self, c: ctypes.CDLL, handle: int, description: Description, members: int) -> None:
+        self._c, self._handle, self.description, self.members = c, handle, description, members
+
+    def __enter__(self) -> LiveEnsemble:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def advance(self, steps: int) -> int:
+        """Every member that is alive takes so many steps; how many still are."""
+        return int(self._c.hamotor_ensemble_advance(self._handle, steps))
+
+    def observe(self, rows: Rows) -> None:
+        """Write a row of the columns for every member, shape (members, columns)."""
+        self._c.hamotor_ensemble_observe(self._handle, 0, self.members, _pointer(rows))
+
+    def states(self, states: Rows) -> None:
+        """Write every member's state now, shape (members, state_size), C-contiguous."""
+        self._c.hamotor_ensemble_states(self._handle, _pointer(states))
+
+    def failures(self) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+        """Of every member why it stopped, a `Failure`, and how many steps it took."""
+        reasons = np.empty(self.members, dtype=np.int32)
+        steps = np.empty(self.members, dtype=np.int64)
+        self._c.hamotor_ensemble_failures(
+            self._handle,
+            reasons.ctypes.data_as(ctypes.POINTER(ctypes.c_int32)),
+            steps.ctypes.data_as(ctypes.POINTER(ctypes.c_int64)),
+        )
+        return reasons, steps
+
+    def stop(self) -> None:
+        """Free the runs.  Harmless when called twice."""
+        if self._handle:
+            self._c.hamotor_ensemble_stop(self._handle)
+            self._handle = 0
 
 
 class LiveRun:

@@ -215,7 +215,10 @@ def open_run(folder: str | os.PathLike[str]) -> Run:
         path = path.parent
     if not is_run(path):
         raise UsageError(f"{path} holds no hamotor run: no valid {REPORT} there.")
-    return Run(json.loads((path / REPORT).read_text(encoding="utf-8")), folder=path)
+    report = json.loads((path / REPORT).read_text(encoding="utf-8"))
+    if "ensemble" in report:
+        raise UsageError(f"{path} holds an ensemble; open it with hamotor.open_ensemble.")
+    return Run(report, folder=path)
 
 
 def units_of(description: Description) -> dict[str, str]:

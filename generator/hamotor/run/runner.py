@@ -302,13 +302,25 @@ class _ConservedWatch:
 
 def _scale(description: Description, quantity: Conserved, initial: Vector) -> float:
     """What a conserved quantity's error is divided by; 0 where it is zero but for rounding."""
+    return float(scales(description, quantity, initial[np.newaxis])[0])
+
+
+def scales(description: Description, quantity: Conserved, initial: Rows) -> Vector:
+    """The same for many initial rows, shape (n, columns)."""
     index = description.column_index
-    norm = float(np.linalg.norm(initial[[index[name] for name in quantity.norm]]))
+    norm = _norms(initial, [index[name] for name in quantity.norm])
     unit = description.columns[index[quantity.column]].unit
     alike = [k for k, column in enumerate(description.columns) if column.unit == unit]
-    if norm <= _VANISHING * float(np.linalg.norm(initial[alike])):
-        norm = 0.0
-    return norm or quantity.scale
+    norm[norm <= _VANISHING * _norms(initial, alike)] = 0.0
+    return np.where(norm > 0.0, norm, quantity.scale)
+
+
+def _norms(rows: Rows, columns: Sequence[int]) -> Vector:
+    """Euclidean, over some columns; added column by column."""
+    square = np.zeros(len(rows))
+    for k in columns:
+        square += rows[:, k] * rows[:, k]
+    return np.sqrt(square)
 
 
 def integrate(

@@ -6,7 +6,7 @@ import math
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
@@ -25,6 +25,7 @@ from hamotor.run.report import Origin, report, to_json
 from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
 from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, plan
 from hamotor.run.tolerance import meet_tolerance
+from hamotor.scene.draws import ALIKE, Ensemble
 
 if TYPE_CHECKING:
     from hamotor.scene import GeneralScene, Scene
@@ -67,6 +68,8 @@ class Simulation:
     """Its class of `hamotor.scene.structure`, for the choice of a method."""
     exact_digits: tuple[str, ...] = ()
     """The initial state in 60 digits."""
+    ensemble: Ensemble = ALIKE
+    """What differs from member to member."""
 
     @property
     def exact_state(self) -> tuple[Fraction, ...]:
@@ -80,11 +83,13 @@ class Simulation:
         kernels: str = "generated",
         representation: str = "ga",
         method: str | None = None,
+        ensembles: bool = False,
         progress: Progress | None = None,
     ) -> Compiled:
         """The scene's shared library with one method, compiled or found in the cache, and loaded.
 
-        `method` is all that the scene offers if not given.  Raises UsageError for an unknown
+        `method` is all that the scene offers if not given.  `ensembles`: that steps many members,
+        too.  Raises UsageError for an unknown
         scalar, kernels, representation or method, ToolError when compilation fails.
         """
         from hamotor.scene.scalars import parse_scalar
@@ -117,6 +122,8 @@ class Simulation:
         if method is not None and self.methods:
             check_method(method, self.offered(kernels, representation))
             source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
+        if ensembles:
+            source = f"#define HAMOTOR_ENSEMBLE\n{source}"
         generate_s = time.perf_counter() - started
         shown = NoProgress() if progress is None else progress
         build = compile_scene(
@@ -125,7 +132,7 @@ class Simulation:
             scalar=scalar,
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
-        return Compiled(build, SceneLibrary(build.library), generate_s)
+        return Compiled(build, SceneLibrary(build.library), generate_s, source)
 
     def offered(self, kernels: str, representation: str) -> Mapping[str, int]:
         """Names and orders of the methods for a form of the scene; none where `methods` is."""
@@ -213,7 +220,7 @@ class Simulation:
             if self.times is not None:  # an earlier end than the scene's leaves the later ones out
                 times = [x for x in self.times if 0 <= x / end <= 1] or None
         if interval is not None:
-            times, every = _at_interval(interval, end, step)
+            times, every = at_interval(interval, end, step)
         methods = self.offered(kernels, representation)
         chosen = method or self.method
         if method is None and chosen not in methods and chosen in self.methods:
@@ -331,7 +338,7 @@ class Simulation:
         if isinstance(recorder, DiskRecorder):
             assert folder is not None
             recorder.write_events(names, rows, csv=csv)
-            folder.publish(recorder, to_json(said))
+            folder.publish(recorder.folder, to_json(said))
             return Run(said, folder=folder.path, units=units)
         assert isinstance(recorder, MemoryRecorder)
         events = {"event": np.array(names)} if names else {}
@@ -342,11 +349,12 @@ class Simulation:
 
 @dataclass(frozen=True)
 class Compiled:
-    """A scene's library with what it cost: `generate_s` seconds to write its C++ text."""
+    """A scene's library with what it cost: `generate_s` seconds to write `source`."""
 
     build: CompiledScene
     library: SceneLibrary
     generate_s: float
+    source: str
 
     @property
     def description(self) -> Description:
@@ -394,6 +402,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "has_events": bool(found.events),
             "spec_hash": found.sha256,
             "structure": structure_of(found),
+            "ensemble": asdict(found.ensemble),
             "methods": methods_offered(found.form if isinstance(found, Scene) else Form.GENERAL),
         }
 
@@ -412,6 +421,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             **known,
             "state": np.array(known["state"]),
             "exact_digits": tuple(known["exact_digits"]),
+            "ensemble": Ensemble.from_json(known["ensemble"]),
         },
         source=source,
         read=read,
@@ -446,7 +456,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
     )
 
 
-def _at_interval(
+def at_interval(
     interval: float, end: float, step: float | None
 ) -> tuple[list[float] | None, int | None]:
     """When to record at the multiples of an interval: at times, or every so many steps."""

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hamotor.codegen.algebra import Algebra, reverse_sign
 from hamotor.scene.conserved import ConservedQuantity
+from hamotor.scene.draws import ALIKE, Ensemble
 from hamotor.scene.exact import decimal, rounded, with_digits
 from hamotor.scene.groups import Group
 from hamotor.scene.model import Event, Output, Time
@@ -85,6 +86,8 @@ class GeneralScene:
     """Functions of the state whose zeros a run finds."""
     headers: tuple[str, ...] = ()
     """Texts of the headers of an algebra of the user's own."""
+    ensemble: Ensemble = ALIKE
+    """What differs from member to member."""
 
     @cached_property
     def initial_state(self) -> NDArray[np.float64]:

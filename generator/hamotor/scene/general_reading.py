@@ -22,6 +22,7 @@ from hamotor.mechanics.lagrangian import Lagrangian, NotHyperregular
 from hamotor.mechanics.language import Vector, read_number, read_vector
 from hamotor.mechanics.vocabulary import Speaker, vocabulary
 from hamotor.scene import schema
+from hamotor.scene.ensemble import Start, read_ensemble
 from hamotor.scene.exact import of_mpmath
 from hamotor.scene.general import (
     GeneralBody,
@@ -181,6 +182,9 @@ def read_general(
         sha256=hashlib.sha256(contents).hexdigest(),
         events=_events(top, system, None if lagrangian else hamiltonian),
         headers=headers,
+        ensemble=read_ensemble(
+            top, lambda: _starts(drafts, started, None if lagrangian else hamiltonian)
+        ),
     )
 
 
@@ -607,6 +611,41 @@ def _started(
         )
         for draft, momentum in zip(drafts, given, strict=True)
     )
+
+
+def _starts(
+    drafts: Sequence[_Draft], started: Sequence[GeneralBody], hamiltonian: Hamiltonian | None
+) -> list[Start]:
+    """The bodies as [ensemble] sees them."""
+    found = []
+    for k, (draft, body) in enumerate(zip(drafts, started, strict=True)):
+        table, given = draft.table, not draft.table.has("motor")
+        rate = None
+        kinetic: tuple[tuple[float, ...], ...] = ()
+        if body.kinetic_matrix is not None and hamiltonian is not None:
+            inverse = body.kinetic_matrix.inv()
+            of_momenta = inverse * sympy.Matrix(body.coordinates.momenta)
+            if all(
+                sympy.expand(a - b) == 0
+                for a, b in zip(hamiltonian.rates[k], of_momenta, strict=True)
+            ):
+                rate = tuple(map(float, inverse * sympy.Matrix(_numbers(body.momentum))))
+                kinetic = tuple(tuple(map(float, row)) for row in body.kinetic_matrix.tolist())
+        position = table.vector("position") if table.group.translates and given else None
+        found.append(
+            Start(
+                name=body.name,
+                algebra=body.coordinates.algebra,
+                group=body.coordinates.group,
+                motor=body.motor,
+                momentum=body.momentum,
+                rate=rate,
+                kinetic=kinetic,
+                position=position,
+                scale=table.number("scale") if table.group.scales and given else None,
+            )
+        )
+    return found
 
 
 SPEEDS = ("velocity", "angular_velocity")

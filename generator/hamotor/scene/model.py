@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from hamotor.scene import inertia
 from hamotor.scene.conserved import ConservedQuantity, conserved_quantities
+from hamotor.scene.draws import ALIKE, Ensemble
 from hamotor.scene.exact import decimal, rounded
 from hamotor.scene.groups import Group
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
@@ -153,6 +154,8 @@ class Scene:
     """Whether the file has events; what they are is read with `general`."""
     reread: Callable[[], GeneralScene] = field(repr=False, compare=False)
     """Reads `general`."""
+    ensemble: Ensemble = ALIKE
+    """What differs from member to member."""
 
     @cached_property
     def general(self) -> GeneralScene:

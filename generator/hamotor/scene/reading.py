@@ -14,9 +14,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from hamotor.codegen.spec import bundled_algebras
+from hamotor.codegen.spec import bundled_algebra, bundled_algebras, bundled_group
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
+from hamotor.scene.ensemble import Start, read_ensemble
 from hamotor.scene.exact import decimal, rounded, written
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
@@ -142,6 +143,7 @@ def parse_scene(
         sha256=hashlib.sha256(contents).hexdigest(),
         has_events=bool(top.tables("event")),
         reread=lambda: _general(top, algebra, name, contents, folder),
+        ensemble=read_ensemble(top, lambda: _starts(bodies)),
     )
     if scene.potential is not None and not scene.general.hamiltonian.autonomous:
         return scene.general
@@ -151,6 +153,24 @@ def parse_scene(
         if not math.isfinite(sum(scene.initial_energy)):
             top.fail("the energy at the start overflows; choose other units or smaller numbers")
     return scene
+
+
+def _starts(bodies: tuple[Body, ...]) -> list[Start]:
+    """The bodies as [ensemble] sees them."""
+    return [
+        Start(
+            name=body.name,
+            algebra=bundled_algebra(body.group.algebra).algebra,
+            group=bundled_group(body.group.algebra, body.group.name),
+            motor=body.motor,
+            momentum=body.momentum,
+            rate=tuple(body.rate),
+            kinetic=tuple(map(tuple, body.kinetic_matrix.tolist())),
+            position=body.position,
+            scale=None,
+        )
+        for body in bodies
+    ]
 
 
 RIGID_INTERACTIONS = ("gravity", "spring", "potential", "newtonian", "dipole")

@@ -43,7 +43,8 @@ class Key:
     kind: str
     """What the reader checks: `number`, `positive`, `non-negative`, `integer`, `flag`, `text`,
     `name`, `one of`, `vector`, `rotation` (a vector, in the plane a number), `lengths`, `moments`,
-    `quaternion`, `matrix`, `times`, `table`, `tables`."""
+    `quaternion`, `matrix`, `times`, `table`, `tables`; in ensembles `whole` (from 0), `wholes`,
+    `fractions` (0 to 1), `distribution`, `vectors`."""
     doc: str
     unit: str = ""
     default: str | None = None
@@ -102,6 +103,7 @@ SCENE = Section(
         Key("event", "tables", "functions of the state whose zeros are found", default="[]"),
         Key("time", "table", "how far and how finely to integrate"),
         Key("output", "table", "what to record", default="{}"),
+        Key("ensemble", "table", "what differs from member to member", default="{}"),
         Key("limits", "table", "how large a scene may be", default="{}"),
     ),
 )
@@ -513,6 +515,80 @@ OUTPUT = Section(
     ),
 )
 
+ENSEMBLE = Section(
+    "[ensemble]",
+    "[ensemble]",
+    (
+        Key("seed", "whole", "of the random numbers, below 2^63", default="0"),
+        Key("body", "tables", "[[ensemble.body]]: what is drawn of the bodies", default="[]"),
+        Key("keep", "wholes", "members whose trajectories are written", default="[]"),
+        Key(
+            "quantiles",
+            "fractions",
+            "which ones the statistics have",
+            default="[0.05, 0.25, 0.5, 0.75, 0.95]",
+        ),
+        Key("final_states", "flag", "whether all members' last states are written", default="true"),
+    ),
+)
+
+ENSEMBLE_BODY = Section(
+    "[[ensemble.body]]",
+    "what is drawn of a body",
+    (
+        Key("name", "name", "which body"),
+        Key("position", "distribution", "", unit="m", where=TRANSLATING),
+        Key("orientation", "table", "a further rotation, about axes of the body frame"),
+        Key("scale", "distribution", "by how much it is enlarged", where=SCALING),
+        Key(
+            "velocity",
+            "distribution",
+            "components in the body frame",
+            unit="m/s",
+            where=TRANSLATING,
+        ),
+        Key("angular_velocity", "distribution", "components in the body frame", unit="rad/s"),
+        Key(
+            "momentum",
+            "table",
+            "distributions under linear and angular, or under the group's generators",
+        ),
+    ),
+)
+
+DISTRIBUTION = Section(
+    "distribution",
+    "a distribution",
+    (
+        Key("mean", "vector", "of a normal distribution; left out: the scene's own value"),
+        Key("sd", "lengths", "standard deviation of a normal distribution; one for all, or each"),
+        Key("low", "vector", "least value of a uniform distribution"),
+        Key("high", "vector", "largest value of a uniform distribution"),
+        Key(
+            "values",
+            "vectors",
+            "instead: an array of values; member i has number i mod their count",
+        ),
+    ),
+)
+
+TURN = Section(
+    "orientation",
+    "a drawn orientation",
+    (
+        Key("uniform", "flag", "all orientations alike", default="false"),
+        Key(
+            "sd",
+            "lengths",
+            "of a normal rotation vector, one for all components or each; with axis: of the angle",
+            unit="rad",
+        ),
+        Key("axis", "vector", "of the rotation, in the body frame", where=SPATIAL),
+        Key("low", "number", "least angle of a uniform distribution", unit="rad"),
+        Key("high", "number", "largest angle of a uniform distribution", unit="rad"),
+    ),
+)
+
 LIMITS = Section(
     "[limits]",
     "[limits]",
@@ -541,6 +617,10 @@ SECTIONS = (
     EVENT,
     TIME,
     OUTPUT,
+    ENSEMBLE,
+    ENSEMBLE_BODY,
+    DISTRIBUTION,
+    TURN,
     LIMITS,
 )
 

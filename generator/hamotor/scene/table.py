@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Any, NoReturn
 
 from hamotor.errors import UsageError, suggest
@@ -138,12 +139,54 @@ class Table:
         return number
 
     def integer(self, name: str) -> int:
-        """An integer, at least 1."""
-        value = self._value(name)
+        """An integer, at least 1, of the kind `whole` at least 0."""
+        least = 0 if self.section.key(name).kind == "whole" else 1
+        return self._integer(self._value(name), name, least)
+
+    def _integer(self, value: object, name: str, least: int) -> int:
         if isinstance(value, bool) or not isinstance(value, int):
             self.fail(f"must be an integer, not {kind_of(value)}", name)
-        if not 1 <= value <= 10**18:
-            self.fail(f"must be at least 1 and at most 10^18, not {kind_of(value)}", name)
+        if not least <= value <= 10**18:
+            self.fail(f"must be at least {least} and at most 10^18, not {kind_of(value)}", name)
+        return value
+
+    def wholes(self, name: str) -> tuple[int, ...]:
+        """Different integers from 0, in order."""
+        found = [
+            self._integer(x, f"{name}: number {k}", 0) for k, x in enumerate(self._array(name), 1)
+        ]
+        if len(set(found)) < len(found):
+            self.fail("has a number twice", name)
+        return tuple(sorted(found))
+
+    def fractions(self, name: str) -> tuple[float, ...]:
+        """Numbers between 0 and 1, in ascending order."""
+        found = tuple(
+            self._number(x, f"{name}: number {k}") for k, x in enumerate(self._array(name), 1)
+        )
+        for k, x in enumerate(found, 1):
+            if not 0 < x < 1:
+                self.fail(f"must lie between 0 and 1, not {x:g}", f"{name}: number {k}")
+        if any(a >= b for a, b in pairwise(found)):
+            self.fail("must ascend", name)
+        return found
+
+    def vectors(self, name: str, length: int) -> tuple[Vector, ...]:
+        """At least one array of `length` finite numbers; where that is 1, numbers."""
+        found = []
+        for k, value in enumerate(rows := self._array(name), 1):
+            row = value if isinstance(value, list) else [value]
+            if len(row) != length:
+                self.fail(f"must be {length} numbers, not {kind_of(value)}", f"{name}: value {k}")
+            found.append(tuple(self._number(x, f"{name}: value {k}") for x in row))
+        if not rows:
+            self.fail("needs at least one value", name)
+        return tuple(found)
+
+    def _array(self, name: str) -> list[Any]:
+        value = self._value(name)
+        if not isinstance(value, list):
+            self.fail(f"must be an array, not {kind_of(value)}", name)
         return value
 
     def times(self, name: str, end: float) -> tuple[float, ...]:

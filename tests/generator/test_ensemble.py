@@ -1,0 +1,459 @@
+"""Ensembles: what is drawn, what is summed up, and that no bit depends on who computed it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import signal
+import sys
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from tests.generator.toy import toy, toy_state
+
+import hamotor
+from hamotor.errors import ToolError, UsageError
+from hamotor.run import cluster
+from hamotor.run.ensemble import CHUNK, PART, Job, Part
+from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
+from hamotor.run.library import SceneLibrary
+from hamotor.run.sampling import starts
+from hamotor.run.simulation import Simulation
+from hamotor.run.statistics import Moments
+from hamotor.scene import parse_scene
+from hamotor.scene.draws import BodyDraws, Draw, Ensemble
+from hamotor.scene.model import Scene
+from hamotor.scene.motors import motor_of, rotation_matrix
+
+RATE, PUSH = 2, 3
+"""Where the toy's momentum has the rate about e3 and the linear momentum along x."""
+
+DRAWS = Ensemble(
+    seed=3,
+    bodies=(
+        BodyDraws(
+            motor=0,
+            momentum=8,
+            momenta=(
+                (RATE, Draw("normal", (-2.0,), (1.0,))),
+                (PUSH, Draw("uniform", (-1.0,), (1.0,))),
+            ),
+        ),
+    ),
+    quantiles=(0.25, 0.5),
+)
+
+
+def many(switches: dict[str, int | str] | None = None, **changes: Any) -> Simulation:
+    """The toy with a drawn rate (mean 0, sd 1) and push (−1 to 1): x(t) = cos t + p sin t."""
+    return toy(switches, ensemble=DRAWS, **{"end": 0.5, "step": 0.05, "every": 5, **changes})
+
+
+def digest(run: EnsembleRun) -> str:
+    """Of everything that must not depend on who computed it."""
+    found = hashlib.sha256()
+    for name, values in sorted(run.statistics.items()):
+        found.update(name.encode() + np.ascontiguousarray(values).tobytes())
+    found.update(np.ascontiguousarray(run.states).tobytes())
+    said = {k: v for k, v in run.report.items() if k not in {"timing", "provenance"}}
+    said["ensemble"] = {k: v for k, v in said["ensemble"].items() if k not in {"engine", "threads"}}
+    found.update(json.dumps(said, sort_keys=True).encode())
+    for member in run.report["ensemble"]["kept"]:
+        for values in run.trajectory(member).values():
+            found.update(np.ascontiguousarray(values).tobytes())
+    return found.hexdigest()
+
+
+# ---------------------------------------------------------------- what is drawn
+
+
+SCENE = """
+algebra = "{algebra}"
+[[body]]
+name = "a"
+mass = 1.0
+{inertia}
+[[body]]
+name = "b"
+mass = 2.0
+{inertia}
+position = {position}
+{more}
+[time]
+end = 1.0
+step = 0.1
+[[ensemble.body]]
+name = "b"
+{draws}
+"""
+SPATIAL = {
+    "algebra": "pga3",
+    "inertia": "inertia = [1.0, 2.0, 2.5]",
+    "position": "[1, -2, 3]",
+    "more": "orientation = { axis = [1, 2, 3], angle = 0.7 }\nvelocity = [0.5, 0, 0]\n"
+    "angular_velocity = [0, 0, 1]\ncenter_of_mass = [0.1, 0, 0]",
+}
+PLANAR = {"algebra": "pga2", "inertia": "inertia = 1.5", "position": "[1, -2]", "more": ""}
+
+
+def scene_of(draws: str, values: Mapping[str, str] = SPATIAL) -> Scene:
+    scene = parse_scene(SCENE.format(draws=draws, **values).encode(), name="s", file="s.toml")
+    assert isinstance(scene, Scene)
+    return scene
+
+
+def drawn(scene: Any, members: int, first: int = 0) -> NDArray[np.float64]:
+    return starts(scene.ensemble, scene.initial_state, 1, first, members)
+
+
+def test_members_start_at_the_values_that_are_listed() -> None:
+    scene = scene_of(
+        "position = { values = [[4, 5, 6], [7, 8, 9]] }\n"
+        "velocity = { values = [[1, 2, 3]] }\nangular_velocity = { values = [[0.1, 0.2, 0.3]] }"
+    )
+    found = drawn(scene, 3)
+    body = scene.bodies[1]
+    for member, position in enumerate([(4, 5, 6), (7, 8, 9), (4, 5, 6)]):
+        np.testing.assert_allclose(found[member, 14:22], motor_of(position, body.rotor), atol=2e-15)
+        rate = (0.1, 0.2, 0.3, 1, 2, 3)
+        np.testing.assert_allclose(found[member, 22:], body.kinetic_matrix @ rate, atol=1e-14)
+    assert (found[:, :14] == scene.initial_state[:14]).all()
+
+
+def test_general_and_rigid_scenes_draw_alike() -> None:
+    draws = "position = { sd = 0.1 }\norientation = { sd = [0.1, 0.2, 0.3] }\nvelocity = { sd = 1 }"
+    scene = scene_of(draws)
+    np.testing.assert_allclose(drawn(scene.general, 5), drawn(scene, 5), atol=1e-14)
+
+
+def test_a_spread_turns_about_axes_of_the_body() -> None:
+    scene = scene_of("orientation = { axis = [0, 0, 2], low = 0.3, high = 0.3 }")
+    c, s = np.cos(0.3), np.sin(0.3)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    found = rotation_matrix(drawn(scene, 1)[0, 14:18].tolist())
+    np.testing.assert_allclose(found, rotation_matrix(scene.bodies[1].rotor) @ turn, atol=1e-15)
+    vector = scene_of("orientation = { sd = [0, 0, 0.5] }")
+    own = rotation_matrix(scene.bodies[1].rotor)
+    rotors = drawn(vector, 4000)[:, 14:18]
+    relative = [own.T @ rotation_matrix(r) for r in rotors.tolist()]
+    turned = np.array([np.arctan2(r[1, 0], r[0, 0]) for r in relative])
+    assert abs(turned.mean()) < 0.03
+    assert abs(turned.std() - 0.5) < 0.02
+    np.testing.assert_allclose([r[2, 2] for r in relative], 1.0, atol=1e-14)
+
+
+@pytest.mark.parametrize(("values", "size"), [(SPATIAL, 3), (PLANAR, 2)])
+def test_uniform_orientations_know_no_direction(values: Mapping[str, str], size: int) -> None:
+    scene = scene_of("orientation = { uniform = true }", values)
+    first = len(scene.bodies[0].motor) + len(scene.bodies[0].momentum)
+    rotors = drawn(scene, 20_000)[:, first : first + (4 if size == 3 else 2)]
+    np.testing.assert_allclose((rotors**2).sum(axis=1), 1.0, atol=1e-15)
+    matrices = np.array([rotation_matrix(r) for r in rotors.tolist()])
+    # Haar measure: R has mean 0, and every entry of it the variance 1/size.
+    np.testing.assert_allclose(matrices.mean(axis=0), 0.0, atol=0.02)
+    np.testing.assert_allclose((matrices**2).mean(axis=0), 1 / size, atol=0.02)
+
+
+def test_distributions_have_their_mean_and_spread_about_the_scenes_own_value() -> None:
+    scene = scene_of(
+        "velocity = { sd = [1, 2, 0] }\nangular_velocity = { low = [0, 0, 1], high = [1, 2, 1] }"
+    )
+    body = scene.bodies[1]
+    momenta = drawn(scene, 40_000)[:, 22:]
+    rates = np.linalg.solve(body.kinetic_matrix, momenta.T)
+    np.testing.assert_allclose(rates[3:].mean(axis=1), [0.5, 0, 0], atol=0.03)
+    np.testing.assert_allclose(rates[3:].std(axis=1), [1, 2, 0], atol=0.03)
+    np.testing.assert_allclose(rates[:3].min(axis=1), [0, 0, 1], atol=1e-3)
+    np.testing.assert_allclose(rates[:3].max(axis=1), [1, 2, 1], atol=1e-3)
+
+
+def test_a_body_that_scales_is_drawn_at_its_sizes() -> None:
+    text = (
+        'algebra = "cga3"\ngroup = "Sim3"\n[[body]]\nname = "a"\nmass = 1.0\n'
+        "inertia = [1.0, 2.0, 2.5]\nposition = [1, 0, 0]\nscale = 2.0\n"
+        '[time]\nend = 1.0\nstep = 0.1\n[[ensemble.body]]\nname = "a"\n'
+        "scale = { values = [2.0, 4.5] }\nmomentum = { e23 = { values = [1.0] } }\n"
+    )
+    scene: Any = parse_scene(text.encode(), name="s", file="s.toml")
+    found, size = drawn(scene, 2), len(scene.group.motor)
+    np.testing.assert_allclose(found[0, :size], scene.bodies[0].motor, atol=1e-15)
+    other: Any = parse_scene(
+        text.replace("scale = 2.0", "scale = 4.5").encode(), name="s", file="s.toml"
+    )
+    np.testing.assert_allclose(found[1, :size], other.bodies[0].motor, atol=1e-15)
+    assert (found[:, size] == 1.0).all()
+
+
+@pytest.mark.parametrize(
+    ("draws", "message"),
+    [
+        ('name = "c"', r'\[\[ensemble.body\]\] 1: unknown body "c"; bodies are "a", "b"'),
+        ("", "draws nothing; give at least one of"),
+        ("postion = { sd = 1 }", 'unknown key "postion".*Did you mean "position"'),
+        ("position = { sd = -1 }", "position: sd: must not be negative"),
+        ("position = { mean = [0, 0, 0] }", 'missing "sd"'),
+        ("position = { sd = 1, low = 0 }", "not several of them"),
+        ("position = { low = [0, 0, 1], high = [1, 1, 0] }", "low: must not be above high"),
+        ("position = { low = [0, 0, 1] }", 'missing "high"'),
+        ("position = { values = [[1, 2]] }", "values: value 1: must be 3 numbers"),
+        ("position = { values = [] }", "needs at least one value"),
+        ("orientation = { uniform = true, sd = 1 }", '"uniform" stands alone'),
+        ("orientation = { low = 0, high = 1 }", 'missing "axis"'),
+        ("orientation = {}", "give uniform = true, sd, or low and high"),
+        ("velocity = { sd = 1 }\nmomentum = { e12 = { sd = 1 } }", "contradict each other"),
+        ("momentum = { e12 = { sd = 1 }, angular = { sd = 1 } }", "angular: is given twice"),
+        ("scale = { sd = 1 }", 'key "scale" has no meaning on SE3'),
+        ('velocity = { sd = 1 }\n[[ensemble.body]]\nname = "b"', "is the body of .* 1 already"),
+    ],
+)
+def test_mistakes_name_the_key(draws: str, message: str) -> None:
+    whole = SCENE.format(draws="", **SPATIAL)
+    if draws.startswith("name"):
+        whole = whole.replace('[[ensemble.body]]\nname = "b"', "[[ensemble.body]]")
+    with pytest.raises(UsageError, match=message):
+        parse_scene((whole + draws).encode(), name="s", file="s.toml")
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ("seed = -1", r"\[ensemble\]: seed: must be at least 0"),
+        ("keep = [1, 1]", "keep: has a number twice"),
+        ("quantiles = [0.5, 1.5]", "quantiles: number 2: must lie between 0 and 1"),
+        ("quantiles = [0.5, 0.25]", "quantiles: must ascend"),
+        ("sead = 1", 'unknown key "sead".*Did you mean "seed"'),
+        ("final_states = 1", "final_states: must be true or false"),
+    ],
+)
+def test_mistakes_in_ensemble_name_the_key(table: str, message: str) -> None:
+    whole = SCENE.format(draws="velocity = { sd = 1 }", **SPATIAL)
+    whole = whole.replace("[[ensemble.body]]", f"[ensemble]\n{table}\n[[ensemble.body]]")
+    with pytest.raises(UsageError, match=message):
+        parse_scene(whole.encode(), name="s", file="s.toml")
+
+
+# ---------------------------------------------------------------- what is summed up
+
+
+def test_statistics_are_those_of_the_members() -> None:
+    members = 40
+    run = run_ensemble(many(), members, keep=range(members))
+    rows = np.array([run.trajectory(k)["bob.position.x"] for k in range(members)])
+    assert run.t.tolist() == pytest.approx([0, 0.25, 0.5])
+    np.testing.assert_allclose(run.mean("bob.position.x"), rows.mean(axis=0), rtol=1e-14)
+    np.testing.assert_allclose(
+        run.deviation("bob.position.x"), rows.std(axis=0, ddof=1), rtol=1e-13, atol=1e-15
+    )
+    assert (run.statistics["bob.position.x.min"] == rows.min(axis=0)).all()
+    assert (run.statistics["bob.position.x.max"] == rows.max(axis=0)).all()
+    for level in (0.25, 0.5):
+        np.testing.assert_allclose(
+            run.quantile("bob.position.x", level), np.quantile(rows, level, axis=0), rtol=1e-14
+        )
+    # x = cos t + p sin t of a uniform p, but for the error of the step.
+    assert run.deviation("bob.position.x")[-1] == pytest.approx(
+        np.sin(0.5) * run.deviation("bob.momentum.e01")[0], rel=1e-3
+    )
+    error = run.report["conserved"]["energy"]
+    energies = np.array([run.trajectory(k)["energy"] for k in range(members)])
+    worst = (np.abs(energies - energies[:, :1]) / energies[:, :1]).max(axis=1)
+    assert error["member"] == int(worst.argmax())
+    assert error["max_relative_error"] == worst.max()
+    assert error["mean_relative_error"] == pytest.approx(worst.mean())
+
+
+def test_merged_moments_are_those_of_all() -> None:
+    values = np.random.default_rng(1).normal(1e6, 1.0, (1000, 2))
+    whole, merged = Moments.none(1, 2), Moments.none(1, 2)
+    whole.put(0, values)
+    for block in np.split(values, [0, 1, 400, 400, 999]):
+        part = Moments.none(1, 2)
+        part.put(0, block)
+        merged.merge(part)
+    assert merged.count.tolist() == [1000]
+    np.testing.assert_allclose(merged.mean, whole.mean, rtol=1e-15)
+    np.testing.assert_allclose(merged.deviation, values.std(axis=0, ddof=1)[np.newaxis], rtol=1e-12)
+    assert (merged.low == values.min(axis=0)).all()
+    assert (merged.high == values.max(axis=0)).all()
+
+
+def test_nothing_depends_on_threads_and_a_member_alone_has_its_bits(tmp_path: Path) -> None:
+    members = PART + CHUNK + 3
+    kept = (5, PART + CHUNK + 1)
+    settings: dict[str, Any] = {"end": 0.1, "keep": kept}
+    one = run_ensemble(many(), members, threads=1, **settings)
+    three = run_ensemble(many(), members, threads=3, **settings)
+    assert digest(three) == digest(one)
+    disk = run_ensemble(many(), members, threads=2, out=tmp_path / "run", csv=True, **settings)
+    assert digest(disk) == digest(one)
+    assert digest(hamotor.open_ensemble(tmp_path / "run")) == digest(one)
+    assert (tmp_path / "run" / "statistics.csv").read_text().startswith('"t","members"')
+    for member in kept:
+        alone = run_ensemble(many(), members, member=member, end=0.1)
+        assert (alone.states[0] == one.states[member]).all()
+        for name, values in alone.trajectory(member).items():
+            assert (values == one.trajectory(member)[name]).all()
+    with pytest.raises(UsageError, match="holds an ensemble"):
+        hamotor.open_run(tmp_path / "run")
+    with pytest.raises(UsageError, match="member 6 was not kept; 5, "):
+        disk.trajectory(6)
+
+
+def test_a_member_that_fails_is_no_failed_run(tmp_path: Path) -> None:
+    toys = many({"FAIL_MEMBER": 7})
+    run = run_ensemble(toys, 100, out=tmp_path / "run", keep=range(4))
+    negative = run.states[:, 8 + RATE] < 0
+    assert 30 < negative.sum() < 70
+    assert run.failures["member"].tolist() == np.flatnonzero(negative).tolist()
+    assert set(run.failures["reason"]) == {"not_finite"}
+    assert run.failures["t"] == pytest.approx(6 * 0.05)
+    assert run.status == "finished"
+    assert run.report["failures"]["count"] == negative.sum()
+    assert run.report["failures"]["first"][0]["member"] == np.flatnonzero(negative)[0]
+    assert run.statistics["members"].tolist() == [100, 100, 100 - negative.sum()]
+    assert run.statistics["bob.momentum.e12.min"][-1] > 0
+    dead = next(k for k in range(4) if negative[k])
+    assert len(run.trajectory(dead)["t"]) == 2
+    assert f"{negative.sum()} members failed" in run.summary()
+    with pytest.raises(EnsembleFailed, match="every member failed"):
+        run_ensemble(toys, states=run.states[negative])
+
+
+def test_states_of_ones_own_are_where_members_start() -> None:
+    states = np.tile(toy_state(), (3, 1))
+    states[:, 8 + PUSH] = [0.0, 1.0, 2.0]
+    run = run_ensemble(toy(end=0.5, step=0.05), states=states)
+    x = run.states[:, 4] * run.states[:, 0] + run.states[:, 5] * run.states[:, 3]
+    assert -2 * x == pytest.approx(np.cos(0.5) + states[:, 8 + PUSH] * np.sin(0.5), abs=1e-3)
+    assert run.report["ensemble"]["seed"] is None
+
+
+def test_an_interrupted_ensemble_keeps_what_was_computed(tmp_path: Path) -> None:
+    toys = many({"SLEEP_US": 2000}, end=100.0, every=1)
+    toys.compile(ensembles=True)
+    timer = threading.Timer(0.7, lambda: os.kill(os.getpid(), signal.SIGINT))
+    timer.start()
+    with pytest.raises(EnsembleInterrupted) as caught:
+        run_ensemble(toys, 3, out=tmp_path / "run", threads=1)
+    timer.join()
+    run = caught.value.run
+    assert run.status == "interrupted"
+    found = hamotor.open_ensemble(tmp_path / "run")
+    assert 2 <= len(found.t) < 2000
+    assert found.statistics["members"].tolist() == [3] * len(found.t)
+    with pytest.raises(EnsembleFailed, match="the time limit passed"):
+        run_ensemble(toys, 3, time_limit=0.2, threads=1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"members": 0}, "members must be a whole number from 1"),
+        ({"members": 5, "member": 5}, "there is no member 5: they are 0 to 4"),
+        ({"members": 5, "keep": [5]}, "cannot keep member 5: they are 0 to 4"),
+        ({"members": 5, "seed": -1}, "a seed is a whole number"),
+        ({"members": 5, "times": [0.12]}, "none of 0.05 s ends at t = 0.12 s"),
+        ({"members": 5, "scalar": "quad"}, "stepped in double and float, not quad"),
+        ({"members": 5, "engine": "dusk"}, 'unknown engine "dusk".*Did you mean "dask"'),
+        ({"members": 5, "scheduler": "tcp://x"}, "a scheduler is for the engine dask"),
+        ({"members": 5, "threads": 0}, "threads must be at least 1"),
+        ({"states": np.zeros((2, 3))}, r"states must have shape \(members, 14\), not \(2, 3\)"),
+    ],
+)
+def test_what_cannot_be_is_said_before_anything_is_stepped(
+    settings: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        run_ensemble(many(), **settings)
+
+
+def test_methods_that_choose_their_steps_are_refused() -> None:
+    with pytest.raises(UsageError, match=r"rkmk54 chooses steps of its own.*splitting2.*do"):
+        run_ensemble("tumbling_debris", 10, method="rkmk54")
+    with pytest.raises(UsageError, match=r"dzhanibekov: all members would be the same"):
+        run_ensemble("dzhanibekov", 10)
+
+
+def test_the_bundled_ensemble_steps_like_single_runs() -> None:
+    simulation = hamotor.load("tumbling_debris")
+    members = 19
+    run = run_ensemble(simulation, members, end=0.4, every=10, keep=[4])
+    compiled = simulation.compile(method="splitting4", ensembles=True)
+    states = starts(simulation.ensemble, simulation.state, 1, 0, members)
+    for member in range(members):
+        with compiled.library.start("splitting4", step=0.02, state=states[member]) as live:
+            live.advance(20, 0, None)
+            assert (live.state() == run.states[member]).all()
+    assert max(q["max_relative_error"] for q in run.report["conserved"].values()) < 1e-4
+    assert "19 members, seed 1, 20 steps of 0.02 s" in run.summary()
+
+
+# ---------------------------------------------------------------- other processes
+
+
+def job_of(
+    tmp_path: Path, members: int, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Job, EnsembleRun]:
+    """A job of the toy as `run_ensemble` makes it, and what it gives here."""
+    jobs: list[Job] = []
+    toys = many()
+    whole = run_ensemble(toys, members, end=0.1, keep=[2], out=tmp_path / "local")
+
+    def note(job: Job, *_: Any) -> Any:
+        jobs.append(job)
+        return iter(())
+
+    monkeypatch.setattr(cluster, "run_parts_on", note)
+    with pytest.raises(EnsembleFailed):
+        run_ensemble(toys, members, end=0.1, keep=[2], engine="dask")
+    return jobs[0], whole
+
+
+def test_a_part_is_a_file_that_is_written_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job, whole = job_of(tmp_path, PART + 10, monkeypatch)
+    parts = tmp_path / "parts"
+    cluster._write_job(parts, job)
+    for number in range(job.parts):
+        cluster.compute_part(str(parts), number)
+    found = [cluster._read(parts, number) for number in range(job.parts)]
+    assert [len(part.states) for part in found] == [PART, 10]
+    assert (np.concatenate([part.states for part in found]) == whole.states).all()
+    total = found[0].tally
+    total.merge(found[1].tally)
+    assert (total.moments.mean[:, 14] == whole.mean("bob.position.x")).all()
+    assert (total.kept[2][:, 15] == whole.trajectory(2)["bob.position.x"]).all()
+    files = {path: path.stat().st_mtime_ns for path in parts.iterdir()}
+    cluster.compute_part(str(parts), 0)
+    assert {path: path.stat().st_mtime_ns for path in parts.iterdir()} == files
+    (parts / "part-00001.npz").write_bytes(b"half a part")
+    with pytest.raises(ToolError, match=r"part-00001.npz cannot be read"):
+        cluster._read(parts, 1)
+    assert replace(job, seed=4).key != job.key
+    assert Job.from_json(json.loads(json.dumps(job.to_json()))) == job
+    assert isinstance(Part.from_arrays(found[0].to_arrays()), Part)
+
+
+def test_dask_is_an_extra_that_the_error_tells_how_to_install(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    message = r"-m pip install --require-hashes -r .*dask.lock"
+    with pytest.raises(ToolError, match=message) as caught:
+        run_ensemble(many(), 10, engine="dask")
+    assert caught.value.exit_code == 4
+    assert cluster.REQUIREMENTS.is_file()
+
+
+def test_states_of_another_shape_are_refused() -> None:
+    library: SceneLibrary = toy().compile().library
+    with pytest.raises(ToolError, match="states of shape"):
+        library.start_ensemble("splitting2", step=0.1, states=np.zeros((1, 3)))

@@ -1,0 +1,64 @@
+"""Random numbers of ensembles: the same for a member whoever is drawn with it, on any machine."""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+import mpmath
+import numpy as np
+
+from hamotor.run.random_numbers import cosine_and_sine, logarithm, normals, uniforms
+
+
+def test_a_members_numbers_do_not_depend_on_the_range_that_is_drawn() -> None:
+    whole = uniforms(7, 0, 50, 6)
+    assert whole.shape == (50, 6)
+    for first, members in ((0, 1), (13, 4), (49, 1)):
+        assert (uniforms(7, first, members, 6) == whole[first : first + members]).all()
+    assert (uniforms(8, 0, 50, 6) != whole).all()
+    assert ((whole > 0) & (whole < 1)).all()
+
+
+def test_the_numbers_of_a_seed_are_pinned() -> None:
+    drawn = uniforms(2026, 10**8, 1, 5)[0]
+    assert [x.hex() for x in drawn] == PINNED_UNIFORM
+    assert [x.hex() for x in normals(drawn)] == PINNED_NORMAL
+
+
+PINNED_UNIFORM = [
+    "0x1.c96a902e87472p-1",
+    "0x1.6305798488069p-2",
+    "0x1.28d67135db542p-1",
+    "0x1.a7ad8a07fc386p-1",
+    "0x1.e3a22f5210a36p-3",
+]
+PINNED_NORMAL = [
+    "0x1.3ea8fe7765c9fp+0",
+    "-0x1.93b49d2923746p-2",
+    "0x1.9c39dff2c0d0ap-3",
+    "0x1.e37d5f0fe7151p-1",
+    "-0x1.6fff46ad11ef0p-1",
+]
+
+
+def test_normal_numbers_are_the_inverse_of_the_normal_distribution() -> None:
+    tails = np.array([2.0**-54, 1e-12, 1e-7, 0.0749, 0.0751, 0.5, 0.9251, 1 - 1e-9, 1 - 2.0**-53])
+    uniform = np.concatenate([tails, uniforms(1, 0, 500, 1)[:, 0]])
+    found = normals(uniform)
+    with mpmath.workdps(40):
+        truth = [float(mpmath.sqrt(2) * mpmath.erfinv(2 * mpmath.mpf(x) - 1)) for x in uniform]
+    np.testing.assert_allclose(found, truth, rtol=2e-15, atol=1e-17)
+    # The same algorithm in the standard library, whose logarithm is another one.
+    others = [NormalDist().inv_cdf(x) for x in uniform]
+    np.testing.assert_allclose(found, others, rtol=4e-15, atol=1e-17)
+
+
+def test_elementary_functions_are_good_to_two_units_in_the_last_place() -> None:
+    x = np.concatenate([uniforms(2, 0, 2000, 1)[:, 0], np.geomspace(1e-300, 1e300, 1000), [1.0]])
+    ln = np.array([math.log(value) for value in x])
+    assert (np.abs(logarithm(x) - ln) <= 2 * np.spacing(np.abs(ln))).all()
+    angles = np.linspace(-6000, 6000, 3001)
+    cosine, sine = cosine_and_sine(angles)
+    np.testing.assert_allclose(cosine, [math.cos(a) for a in angles], rtol=0, atol=3e-16)
+    np.testing.assert_allclose(sine, [math.sin(a) for a in angles], rtol=0, atol=3e-16)
