@@ -1,7 +1,8 @@
 """Where the peers are installed: an environment of their own, apart from what Hamotor needs.
 
 `python -m tests.peers.environment` installs them; `./hamotor test --with-peers` does so first.
-Public solvers to measure beside have another one, `python -m tests.peers.environment solvers`.
+Public solvers to measure beside have another one, `python -m tests.peers.environment solvers`, and
+so has dask, `python -m tests.peers.environment dask`, which sees the packages of ours as well.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import hashlib
 import shutil
 import subprocess
 import sys
+import sysconfig
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -23,6 +25,9 @@ PYTHON = FOLDER / "python" / "bin" / "python"
 NODE_MODULES = FOLDER / "node" / "node_modules"
 _PYTHON_PINS = (HERE / "requirements.txt",)
 _SOLVER_PINS = (ROOT / "tests" / "bench" / "precision" / "requirements.txt",)
+_DASK_PINS = (ROOT / "requirements-dask.lock",)
+DASK_PYTHON = FOLDER / "dask" / "bin" / "python"
+INSTALL_DASK = ".hamotor/venv/bin/python -m tests.peers.environment dask"
 _NODE_PINS = (HERE / "package.json", HERE / "package-lock.json")
 
 
@@ -56,12 +61,31 @@ def install_solvers() -> list[str]:
         return [] if done else _install_python("solvers", _SOLVER_PINS)
 
 
+def has_dask() -> bool:
+    """Whether dask is installed, as pinned."""
+    return _stamp("dask") == _digest(_DASK_PINS)
+
+
+def install_dask() -> list[str]:
+    """The same for dask, in an environment that has all that ours has."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with (FOLDER / "lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if has_dask():
+            return []
+        problems = _install_python("dask", _DASK_PINS)
+        for packages in (FOLDER / "dask" / "lib").glob("python3*/site-packages"):
+            (packages / "hamotor.pth").write_text(sysconfig.get_path("purelib"), encoding="utf-8")
+        return problems
+
+
 def _install_python(part: str, pins: tuple[Path, ...]) -> list[str]:
     folder = FOLDER / part
     shutil.rmtree(folder, ignore_errors=True)
     python = str(folder / "bin" / "python")
     pip = (python, "-m", "pip", "--disable-pip-version-check", "install", "--quiet")
-    names = ", ".join(p.partition("==")[0] for p in pins[0].read_text(encoding="utf-8").split())
+    words = pins[0].read_text(encoding="utf-8").split()
+    names = ", ".join(word.partition("==")[0] for word in words if "==" in word)
     return _run_all(
         names,
         (
@@ -109,6 +133,7 @@ def _stamp(part: str) -> str:
 
 
 if __name__ == "__main__":
-    asked = install_solvers if sys.argv[1:] == ["solvers"] else install
+    others = {"solvers": install_solvers, "dask": install_dask}
+    asked = others.get(" ".join(sys.argv[1:]), install)
     if problems := asked():
         sys.exit("\n".join(problems))
