@@ -56,8 +56,7 @@ _BENCHMARKS = ("kernels", "steps", "precision", "stability")
 _COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test", "bench")
 _ENSEMBLE_OPTIONS = ("seed", "threads", "member", "keep", "engine", "scheduler")
 _NOT_FOR_ENSEMBLES = {
-    "tolerance": "all members take the same steps; give --step",
-    "local_tolerance": "all members take the same steps; give --step",
+    "tolerance": "it is verified for single runs; give --step or --local-tolerance",
     "digits": "members are stepped in double or float",
     "kernels": "only generated kernels step members",
     "representation": "only motors step members",
@@ -450,6 +449,7 @@ def _run_ensemble(parsed: argparse.Namespace) -> int:
             scheduler=parsed.scheduler,
             end=parsed.end,
             step=parsed.step,
+            local_tolerance=parsed.local_tolerance,
             method=parsed.method,
             every=parsed.every,
             times=parsed.at,

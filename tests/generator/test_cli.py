@@ -126,7 +126,7 @@ def test_a_rejected_text_exits_with_4(
         ("run toy --step 1 --tolerance 1", "not allowed with"),
         ("run toy --ensemble 10", "all members would be the same"),
         ("run toy --seed 1", "--seed goes with --ensemble N"),
-        ("run toy --ensemble 2 --tolerance 1", "all members take the same steps"),
+        ("run toy --ensemble 2 --tolerance 1", "it is verified for single runs"),
         ("run toy --engine dask", "--engine goes with --ensemble N"),
         ("run toy --kernels hand", 'unknown kernels "hand"'),
         ("run toy --scalar half", 'unknown scalar "half"'),

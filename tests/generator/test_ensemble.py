@@ -363,6 +363,7 @@ def test_an_interrupted_ensemble_keeps_what_was_computed(tmp_path: Path) -> None
         ({"members": 5, "scalar": "quad"}, "stepped in double and float, not quad"),
         ({"members": 5, "engine": "dusk"}, 'unknown engine "dusk".*Did you mean "dask"'),
         ({"members": 5, "scheduler": "tcp://x"}, "a scheduler is for the engine dask"),
+        ({"members": 5, "local_tolerance": 1e-6}, "splitting2 does not choose its steps"),
         ({"members": 5, "threads": 0}, "threads must be at least 1"),
         ({"states": np.zeros((2, 3))}, r"states must have shape \(members, 14\), not \(2, 3\)"),
     ],
@@ -374,11 +375,11 @@ def test_what_cannot_be_is_said_before_anything_is_stepped(
         run_ensemble(many(), **settings)
 
 
-def test_methods_that_choose_their_steps_are_refused() -> None:
-    with pytest.raises(UsageError, match=r"rkmk54 chooses steps of its own.*splitting2.*do"):
-        run_ensemble("tumbling_debris", 10, method="rkmk54")
+def test_scenes_that_draw_nothing_are_refused() -> None:
     with pytest.raises(UsageError, match=r"dzhanibekov: all members would be the same"):
         run_ensemble("dzhanibekov", 10)
+    with pytest.raises(UsageError, match=r"rkmk44.*Did you mean .rkmk4"):
+        run_ensemble("tumbling_debris", 10, method="rkmk44")
 
 
 def test_the_bundled_ensemble_steps_like_single_runs() -> None:

@@ -61,6 +61,8 @@ class Job:
     members: int
     keep: tuple[int, ...]
     """Members whose rows are kept."""
+    tolerance: float | None = None
+    """The local error per second of a method that chooses its steps, member by member."""
     given: Rows | None = field(default=None, compare=False)
     """States of the user's own, shape (members, state_size), in place of drawn ones."""
 
@@ -245,9 +247,9 @@ def refuse_impossible(library: SceneLibrary, job: Job) -> None:
 
 
 def _start(library: SceneLibrary, job: Job, states: Rows) -> LiveEnsemble:
-    live = library.start_ensemble(job.method, step=job.step, states=states)
+    live = library.start_ensemble(job.method, step=job.step, states=states, tolerance=job.tolerance)
     if live is None:
-        raise UsageError(f"{job.method} does not step ensembles.")
+        raise UsageError(f"{job.method} does not step ensembles of this scene.")
     return live
 
 

@@ -69,6 +69,7 @@ def ensemble_report(
         "step": job.step,
         "asked_step": plan.asked_step,
         "steps": job.steps,
+        "local_tolerance": job.tolerance,
         "rows": len(statistics["t"]),
         "t_end": float(statistics["t"][-1]) if len(statistics["t"]) else 0.0,
         "scalar": description.scalar.replace(" ", "_"),

@@ -33,7 +33,7 @@ from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.random_numbers import MOST_SEEDS
 from hamotor.run.report import Report, to_json
 from hamotor.run.runner import Interruption, Plan, plan
-from hamotor.run.simulation import Compiled, Simulation, at_interval, load
+from hamotor.run.simulation import ROWS, Compiled, Simulation, at_interval, load
 from hamotor.run.statistics import quantiles
 
 if TYPE_CHECKING:
@@ -194,6 +194,7 @@ def run_ensemble(
     scheduler: str | None = None,
     end: float | None = None,
     step: float | None = None,
+    local_tolerance: float | None = None,
     method: str | None = None,
     every: int | None = None,
     times: Sequence[float] | None = None,
@@ -210,7 +211,9 @@ def run_ensemble(
     (members, state_size): per body the motor, body to world, and the momentum, body frame.
     `member` runs that one alone: it gives the bits that it has among all.  Every `every`-th step,
     at `times` or at the multiples of `interval`, which steps must reach, statistics are taken over
-    the members that are alive, and the rows of those in `keep` are kept.
+    the members that are alive, and the rows of those in `keep` are kept.  With `local_tolerance`
+    (1/s) methods that choose their steps do so for each member, and `step` is how often they
+    deliver the state.
 
     `threads` of this machine (all if not given); or `engine` "dask" computes on the workers of
     `scheduler` (its address; without one, processes on this machine).  No result depends on either.
@@ -222,7 +225,9 @@ def run_ensemble(
     member that fails is no error: it is in `failures`.
     """
     simulation = scene if isinstance(scene, Simulation) else load(scene)
-    chosen, reason = _method(simulation, method)
+    chosen, reason = method or simulation.method, ""
+    if simulation.methods:
+        chosen, reason = choose_method(chosen, simulation.methods, None, simulation.structure)
     if scalar not in SCALARS:
         raise UsageError(f"ensembles are stepped in {' and '.join(SCALARS)}, not {scalar}.")
     if engine not in ENGINES:
@@ -241,7 +246,11 @@ def run_ensemble(
     seed = simulation.ensemble.seed if seed is None else seed
     if not 0 <= seed < MOST_SEEDS:
         raise UsageError(f"a seed is a whole number from 0 and below 2^64, not {seed}.")
-    planned, recorded = _planned(simulation, chosen, end, step, every, times, interval)
+    if local_tolerance is not None and step is None:
+        step = abs(simulation.end if end is None else end) / ROWS
+    planned, recorded = _planned(
+        simulation, chosen, end, step, local_tolerance, every, times, interval
+    )
     threads = _cores() if threads is None else threads
     if threads < 1:
         raise UsageError(f"threads must be at least 1, not {threads}.")
@@ -257,6 +266,8 @@ def run_ensemble(
     description = compiled.description
     if not simulation.methods:
         chosen, reason = choose_method(chosen, description.methods)
+    if local_tolerance is not None and chosen not in description.error_controlled:
+        raise UsageError(f"{chosen} does not choose its steps, so it has no local tolerance.")
     if description.ensemble is None:
         raise UsageError(f"{simulation.name}: scenes of its kind are not stepped as ensembles.")
     job = Job(
@@ -271,6 +282,7 @@ def run_ensemble(
         first=first,
         members=count,
         keep=tuple(k for k in kept if first <= k < first + count),
+        tolerance=local_tolerance,
         given=None if states is None else np.asarray(states, dtype=np.float64),
     )
     refuse_impossible(compiled.library, job)
@@ -467,28 +479,6 @@ def _reason_names() -> list[str]:
     return [reason.name.lower() for reason in Failure]
 
 
-def ensemble_methods(simulation: Simulation) -> dict[str, int]:
-    """Names and orders of the methods that ensembles of a scene can be stepped with."""
-    from hamotor.scene import METHODS
-
-    refused = {method.name for method in METHODS if method.error_controlled}
-    return {name: order for name, order in simulation.methods.items() if name not in refused}
-
-
-def _method(simulation: Simulation, asked: str | None) -> tuple[str, str]:
-    """The method, and why; UsageError for one that does not step ensembles."""
-    wanted = asked or simulation.method
-    if not simulation.methods:
-        return wanted, ""
-    able = ensemble_methods(simulation)
-    if wanted in simulation.methods and wanted not in able:
-        raise UsageError(
-            f"{wanted} chooses steps of its own for every member, so it does not step ensembles; "
-            f"{', '.join(able)} do."
-        )
-    return choose_method(wanted, able, None, simulation.structure)
-
-
 def _range(
     simulation: Simulation, members: int | None, member: int | None, states: Rows | None
 ) -> tuple[int, int]:
@@ -532,6 +522,7 @@ def _planned(
     method: str,
     end: float | None,
     step: float | None,
+    tolerance: float | None,
     every: int | None,
     times: Sequence[float] | None,
     interval: float | None,
@@ -543,8 +534,8 @@ def _planned(
     step = simulation.step if step is None else step
     if step is None:
         raise UsageError(
-            f"{simulation.name}: has a tolerance, but all members of an ensemble take the same "
-            "steps; give a step."
+            f"{simulation.name}: has a tolerance of the final state, which is verified for single "
+            "runs only; give a step or a local tolerance."
         )
     if every is None and times is None and interval is None:
         every, interval = simulation.every, simulation.interval
@@ -552,7 +543,7 @@ def _planned(
             times = [x for x in simulation.times if 0 <= x / end <= 1] or None
     if interval is not None:
         times, every = at_interval(interval, end, step)
-    planned = plan(method, end=end, step=step, every=every or 1, times=times)
+    planned = plan(method, end=end, step=step, every=every or 1, times=times, tolerance=tolerance)
     if planned.times is None:
         if planned.steps // planned.every > MOST_TIMES:
             raise UsageError(

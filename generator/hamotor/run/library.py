@@ -297,10 +297,13 @@ class SceneLibrary:
             raise ToolError(f'the compiled scene would not start method "{method}"')
         return LiveRun(self._c, handle, self.description)
 
-    def start_ensemble(self, method: str, *, step: float, states: Rows) -> LiveEnsemble | None:
+    def start_ensemble(
+        self, method: str, *, step: float, states: Rows, tolerance: float | None = None
+    ) -> LiveEnsemble | None:
         """Begin a run of every row of `states`, shape (members, state_size), at t = 0.
 
-        None for a method that the library has no ensembles of.
+        Methods that choose their steps do so for each.  None for one that the library has no
+        ensembles of.
         """
         size = self.description.state_size
         if states.ndim != 2 or states.shape[1] != size or self.description.ensemble is None:
@@ -310,7 +313,15 @@ class SceneLibrary:
             )
         initial = np.ascontiguousarray(states, dtype=np.float64)
         handle = self._c.hamotor_ensemble_start(
-            method.encode(), 0.0, step, 0.0, len(initial), _pointer(initial), None, 1, 0
+            method.encode(),
+            0.0,
+            step,
+            tolerance or 0.0,
+            len(initial),
+            _pointer(initial),
+            None,
+            1,
+            0,
         )
         return LiveEnsemble(self._c, handle, self.description, len(initial)) if handle else None
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 KERNELS = ("generated", "generic")
 REPRESENTATIONS = ("ga", "matrix")
 
-_ROWS = 1000
+ROWS = 1000
 _MOST_TIMES = 10_000_000
 
 
@@ -212,7 +212,7 @@ class Simulation:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
         end = self.end if end is None else end
         if local_tolerance is not None:
-            step = abs(end) / _ROWS if step is None else step
+            step = abs(end) / ROWS if step is None else step
         elif step is None and tolerance is None:
             step, tolerance = self.step, self.tolerance
         if every is None and times is None and interval is None:
