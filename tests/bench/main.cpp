@@ -29,18 +29,20 @@ void enter_ganja();
 
 int main(int argc, char** argv) {
   bench::enter_generated();
-  bench::enter_tables();
   bench::enter_eigen_quaternion();
+#ifndef HAMOTOR_BENCH_BRIEF
+  bench::enter_tables();
   bench::enter_eigen_matrix();
+  bench::enter_conformal_generated();
+  bench::enter_conformal_tables();
+  bench::enter_conformal_matrices();
+#endif
 #ifdef HAMOTOR_BENCH_GLM
   bench::enter_glm();
 #endif
 #ifdef HAMOTOR_BENCH_GANJA
   bench::enter_ganja();
 #endif
-  bench::enter_conformal_generated();
-  bench::enter_conformal_tables();
-  bench::enter_conformal_matrices();
   constexpr std::string_view option = "--errors=";
   if (argc == 2 && std::string_view(argv[1]).starts_with(option)) {
     std::FILE* const file = std::fopen(argv[1] + option.size(), "w");

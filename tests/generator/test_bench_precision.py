@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from tests.bench.precision import peers
 
-from hamotor.bench import endpoint
+from hamotor.bench import endpoint, solvers
+from hamotor.bench.contest import Extent
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
-from hamotor.bench.precision import Extent, measure
+from hamotor.bench.precision import measure
 from hamotor.bench.precision_report import best, table, write_report
 from hamotor.bench.problems import REFERENCES, Problem, Reference, own_problems, problem
 from hamotor.bench.summary import summary
@@ -149,7 +150,13 @@ def test_the_summary_says_what_a_kernel_and_a_digit_cost() -> None:
         ]
     }
     precision = {
-        "problems": {"p": {"description": "a body", "end_s": 1.0}},
+        "problems": {
+            "p": {
+                "description": "a body",
+                "end_s": 1.0,
+                "set_up": {"generate_s": 0.5, "compile_s": 4.0},
+            }
+        },
         "rows": _rows([1e-5, 1e-5, 1e-5], [7, 8, 9]),
         "not_there": {"heyoka": "not installed"},
     }
@@ -157,7 +164,62 @@ def test_the_summary_says_what_a_kernel_and_a_digit_cost() -> None:
     assert re.search(r"motor \* motor +3\.0 ns +6\.0 ns +0\.50", text)
     assert re.search(r"1e-04 rad +7 µs  m ", text)
     assert "heyoka: not installed" in text
+    assert "0.5 s to generate, 4.0 s to compile" in text
 
 
 def test_the_problems_are_named_as_their_references() -> None:
     assert own_problems() == sorted(Path(file).stem for file in REFERENCES.glob("*.json"))
+
+
+@pytest.mark.slow
+def test_public_solvers_in_cpp_end_where_the_reference_does() -> None:
+    gaps: dict[str, str] = {}
+    there = solvers.libraries(("g++",), solvers.peers_here(gaps), gaps)
+    for _, family, library, names in there:
+        for name in ("P1", "P3", "P4"):
+            given = problem(name).for_peers
+            assert not isinstance(given, str)
+            for solver in names:
+                peer = peers.Compiled(peers.Problem(given), 1e-11, library=library, solver=solver)
+                result = peer.run(1)
+                end = endpoint.of_quaternion(problem(name).scene, result.state)
+                errors = endpoint.errors(end, problem(name).reference.end)
+                assert errors[ATTITUDE] < 1e-4, (family, solver, name)
+                assert result.evaluations is not None
+                assert result.steps is not None
+                assert result.evaluations > result.steps > 10
+                assert 0 < result.processor[0] < 10
+    assert {family for _, family, _, _ in there} | gaps.keys() >= {"odeint", "SUNDIALS"}
+
+
+def test_a_scene_in_conformal_algebra_is_the_same_motion() -> None:
+    twin = problem("P4").conformal
+    assert not isinstance(twin, str)
+    assert twin.scene.algebra == "cga3"
+    own = problem("P4").simulation
+    start, other = own.state, twin.simulation.state
+    # T = 1 - ½ t e_i∧e∞ has the translation of 1 - ½ t e0∧e_i, with e0 → -e∞.
+    assert other[8:] == pytest.approx(start[8:], abs=1e-15)
+    assert other[:4] == pytest.approx(start[:4], abs=1e-15)
+    assert "point fixed" in str(problem("P3").conformal)
+
+
+def test_peers_that_are_not_there_are_gaps_with_their_command(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(solvers, "_INCLUDES", ())
+    gaps: dict[str, str] = {}
+    here = solvers.peers_here(gaps)
+    assert not here.keys() & {"boost", "sundials"}
+    assert gaps["SUNDIALS"].endswith("apt-get install libsundials-dev")
+    assert solvers.libraries(("g++",), here, gaps) == []
+
+
+def test_every_family_says_how_it_is_tuned() -> None:
+    gaps: dict[str, str] = {}
+    every = dict.fromkeys((*solvers.peers_here(gaps), *peers.PACKAGES), "1")
+    every.pop("boost", None)
+    every.pop("sundials", None)
+    extent = Extent(1, 2.0, 0.001, 0.01, forms=False, compilers=())
+    found = solvers.contestants("P1", (), every, extent, gaps)
+    assert {c.family for c in found} <= solvers.TUNED.keys()

@@ -1,25 +1,39 @@
-"""What a benchmark of runs says: on the screen, in a file, and of what machine."""
+"""What every benchmark says: on the screen, in a file, of what machine and with which tools."""
 
 from __future__ import annotations
 
+import os
 import platform
 import sys
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from hamotor import __version__
-from hamotor.run.build import processor_name
+from hamotor.run.build import default_includes, headers_digest, processor_name
 from hamotor.run.report import to_json
 
 
-def provenance() -> dict[str, str]:
-    """The version of Hamotor, the processor and its architecture."""
+def provenance(**more: Any) -> dict[str, Any]:
+    """Hamotor and its headers, the machine with what else it does, the date; and `more`."""
     return {
         "version": __version__,
-        "processor": processor_name(),
+        "headers": headers_digest(default_includes()),
+        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "python": platform.python_version(),
+        "system": platform.system(),
         "machine": platform.machine(),
+        "processor": processor_name(),
+        "processors": os.cpu_count(),
+        "load": list(os.getloadavg()),
+        **more,
     }
+
+
+def say(text: str) -> None:
+    """A line of progress."""
+    print(text, file=sys.stderr, flush=True)
 
 
 def publish(
@@ -36,4 +50,4 @@ def publish(
         out.mkdir(parents=True, exist_ok=True)
         file = out / f"{account['benchmark']}.json"
         file.write_text(text, encoding="utf-8")
-        print(f"wrote {file}", file=sys.stderr, flush=True)
+        say(f"wrote {file}")

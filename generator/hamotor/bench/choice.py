@@ -15,7 +15,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hamotor.bench.precision import COMPILERS, Extent, measure
+from hamotor.bench.contest import Extent
+from hamotor.bench.precision import COMPILERS, measure
 from hamotor.bench.precision_report import by_contestant, meeting
 from hamotor.bench.problems import problem
 from hamotor.errors import UsageError

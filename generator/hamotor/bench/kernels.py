@@ -8,12 +8,10 @@ the median of them: what else runs on the machine then disturbs all contestants 
 from __future__ import annotations
 
 import json
-import os
 import platform
 import re
 import shutil
 import subprocess
-import sys
 import tempfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -22,10 +20,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from hamotor import __version__
+from hamotor.bench.account import provenance, publish, say
 from hamotor.bench.report import MODES, draw_ratios, table
 from hamotor.errors import CheckFailed, ToolError
-from hamotor.run.build import processor_name
 
 ROOT: Final = Path(__file__).resolve().parents[3]
 COMPILERS: Final = ("g++", "clang++")
@@ -58,49 +55,37 @@ class Row:
 
 
 def bench_kernels(
-    out: Path | None = None, json: bool = False, quick: bool = False
+    out: Path | None = None, json: bool = False, quick: bool = False, brief: bool = False
 ) -> dict[str, Any]:
     """Build, run and account for the benchmark of kernels.
 
     out: where kernels.json and kernels.png go; None: nowhere.  json: print the account on stdout
     instead of the table.  quick: double only, chains and arrays of 256, three repetitions.
+    brief: quick, and only motions in chains, beside Eigen's quaternions, with one compiler.
     Returns the account.  Raises ToolError if a tool is missing or the build fails, CheckFailed if
     contestants do not agree on what an operation gives.
     """
-    compilers = _compilers()
-    programs = _build(compilers, quick)
+    quick = quick or brief
+    compilers = _compilers()[: 1 if brief else None]
+    programs = _build(compilers, quick, brief)
     rows: list[Row] = []
     for compiler, program in programs.items():
-        _say(f"timing, {compiler}")
-        rows += _rows(compiler, program, quick)
+        say(f"timing, {compiler}")
+        rows += _rows(compiler, program, quick, brief)
     account = {
         "benchmark": "kernels",
         "quick": quick,
         "unit": "ns per operation, median of the repetitions",
         "error": "largest relative error of 1000 random inputs against __float128",
         "rows": [asdict(row) for row in rows],
-        "not_there": _not_there({row.contestant for row in rows}),
+        "not_there": {} if brief else _not_there({row.contestant for row in rows}),
         "provenance": _provenance(programs),
     }
-    _print(account, as_json=json)
+    publish(account, table, out=out, as_json=json)
     if out is not None:
-        _write(account, out)
+        draw_ratios(account, out / "kernels.png")
+        say(f"wrote {out / 'kernels.png'}")
     return account
-
-
-def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
-    print(json.dumps(account, indent=1) if as_json else table(account), flush=True)
-
-
-def _write(account: Mapping[str, Any], out: Path) -> None:
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "kernels.json").write_text(json.dumps(account, indent=1) + "\n", encoding="utf-8")
-    draw_ratios(account, out / "kernels.png")
-    _say(f"wrote {out / 'kernels.json'} and {out / 'kernels.png'}")
-
-
-def _say(text: str) -> None:
-    print(text, file=sys.stderr, flush=True)
 
 
 def _compilers() -> list[str]:
@@ -115,19 +100,20 @@ def _compilers() -> list[str]:
     return found
 
 
-def _build(compilers: Sequence[str], quick: bool) -> dict[str, Path]:
+def _build(compilers: Sequence[str], quick: bool, brief: bool) -> dict[str, Path]:
     """The benchmark program of each compiler, built side by side."""
-    _say(f"building with {' and '.join(compilers)}")
+    say(f"building with {' and '.join(compilers)}")
     with ThreadPoolExecutor(len(compilers)) as pool:
-        folders = list(pool.map(lambda compiler: _build_one(compiler, quick), compilers))
+        folders = list(pool.map(lambda compiler: _build_one(compiler, quick, brief), compilers))
     return {
         compiler: folder / "tests" / "bench" / "kernels"
         for compiler, folder in zip(compilers, folders, strict=True)
     }
 
 
-def _build_one(compiler: str, quick: bool) -> Path:
-    folder = ROOT / ".hamotor" / "build" / f"bench-{'quick-' * quick}{compiler}"
+def _build_one(compiler: str, quick: bool, brief: bool) -> Path:
+    kind = "brief-" if brief else "quick-" if quick else ""
+    folder = ROOT / ".hamotor" / "build" / f"bench-{kind}{compiler}"
     cache = folder / "CMakeCache.txt"
     home = f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}\n"
     if cache.is_file() and home not in cache.read_text(encoding="utf-8"):
@@ -138,6 +124,7 @@ def _build_one(compiler: str, quick: bool) -> Path:
         f"-DCMAKE_CXX_FLAGS_RELEASE={FLAGS}", "-DHAMOTOR_NATIVE=ON",
         "-DHAMOTOR_BUILD_TESTS=OFF", "-DHAMOTOR_BUILD_BENCHMARKS=ON",
         f"-DHAMOTOR_BENCH_DOUBLE_ONLY={'ON' if quick else 'OFF'}",
+        f"-DHAMOTOR_BENCH_BRIEF={'ON' if brief else 'OFF'}",
     )  # fmt: skip
     _run("cmake", "--build", str(folder), "--target", "kernels")
     return folder
@@ -155,13 +142,14 @@ def _run(*command: str) -> str:
     return done.stdout
 
 
-def _rows(compiler: str, program: Path, quick: bool) -> list[Row]:
+def _rows(compiler: str, program: Path, quick: bool, brief: bool) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         errors = _errors(program, Path(folder) / "errors")
+        chosen = "double.*latency" if brief else "double.*(latency|256)" if quick else "."
         times = Path(folder) / "times.json"
         _run(
             str(program),
-            f"--benchmark_filter={'double.*(latency|256)' if quick else '.'}",
+            f"--benchmark_filter={chosen}",
             f"--benchmark_repetitions={3 if quick else 7}",
             f"--benchmark_min_time={0.002 if quick else 0.005}",
             "--benchmark_enable_random_interleaving=true",
@@ -218,19 +206,14 @@ def _not_there(contestants: set[str]) -> dict[str, str]:
 
 def _provenance(programs: Mapping[str, Path]) -> dict[str, Any]:
     program = next(iter(programs.values()))
-    return {
-        "hamotor": __version__,
-        "compilers": {compiler: _first_line(compiler, "--version") for compiler in programs},
-        "flags": f"-std=gnu++20 {FLAGS} -fno-math-errno "
+    return provenance(
+        compilers={compiler: _first_line(compiler, "--version") for compiler in programs},
+        flags=f"-std=gnu++20 {FLAGS} -fno-math-errno "
         + ("-mcpu=native" if platform.machine() in {"aarch64", "arm64"} else "-march=native"),
-        "contraction": "generated: -ffp-contract=off (it fuses by itself); all others: fast",
-        "eigen": _package_version(program, "Eigen3"),
-        "google_benchmark": _package_version(program, "benchmark"),
-        "python": platform.python_version(),
-        "system": f"{platform.system()} {platform.machine()}",
-        "processor": processor_name(),
-        "processors": os.cpu_count(),
-    }
+        contraction="generated: -ffp-contract=off (it fuses by itself); all others: fast",
+        eigen=_package_version(program, "Eigen3"),
+        google_benchmark=_package_version(program, "benchmark"),
+    )
 
 
 def _first_line(*command: str) -> str:

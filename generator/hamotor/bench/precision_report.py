@@ -4,32 +4,52 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from hamotor.bench.endpoint import ATTITUDE
+from hamotor.bench.solvers import TUNED
 
 Rows = Sequence[Mapping[str, Any]]
 
 
-RULES: Final = """\
+_RULES: Final = """\
 Every contestant starts from the same numbers and ends at the same time; the error is measured \
-there, against the reference.
-Times are those of the whole integration on one core, the best of the runs, which are interleaved \
-over all contestants in one process; median and worst stand beside it. Set-up (generation, \
-compilation, building a solver) is not in them.
+there, against the reference: attitude, position, momentum and energy each in its unit. Targets \
+are for the quantity that is named with the problem.
+Times are those of the whole integration on one core, the best of the runs, which are \
+interleaved over all contestants in one process; median and worst stand beside it, and the least \
+time that the thread had the processor. Set-up (generation, compilation, building a solver, the \
+first step) is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why.
-Public solvers integrate a quaternion and body rates (place and velocity): 7 or 13 numbers. C++ \
-ones are compiled by each compiler with -O3 -march=native, the faster counts, as do the scenes of \
-the methods that lead. heyoka: compact_mode \
-off, with and without fast_math, its compilation and the time of an empty call taken off. SciPy's \
-rates are plain Python floats, which is faster than NumPy at this size. MuJoCo takes all steps in \
-one call.
-A peer that is not installed is listed with the command that installs it.
+Scenes and solvers in C++ are compiled with -O3 -march=native, those that lead by each compiler, \
+of which the faster counts.
+Evaluations are those of rates or forques, and of a Taylor series its order. Operations are \
+counted by a run with numbers that count, from the first 200 steps: generated and generic \
+kernels and conformal algebra in double; of other scalars, of matrices and of public solvers \
+nobody counts.
+A scene in conformal algebra is a general one, with a whole gradient, as is one with generic \
+kernels (dense multivectors by table; sparse tables are measured by `bench kernels`): neither \
+knows principal axes.
+Scalars wider than a double start from doubles and are read in doubles here: they show rounding, \
+not more digits.
+Long runs take the scene's step; solvers with a tolerance take 1e-14 and their own steps for the \
+same time. Relative errors of what is conserved are taken over its size at the start; the \
+attitude, where the motion has a closed form, is held against that in quad. What would take too \
+long takes fewer steps. p is the slope of log error over log steps in the last two decades.
+A peer that is not installed is listed with the command that installs it; what a peer cannot \
+express is listed, too.
+Public solvers integrate a quaternion and body rates (place and velocity): 7 or 13 numbers; \
+engines of rigid bodies have their own coordinates.
 """.splitlines()
+
+
+def rules(families: Collection[str]) -> list[str]:
+    """How it was measured, and how these solvers are tuned."""
+    return [*_RULES, *(text for family, text in TUNED.items() if family in families)]
 
 
 @dataclass(frozen=True)
@@ -85,7 +105,9 @@ def standings(account: Mapping[str, Any]) -> list[dict[str, Any]]:
     found = []
     for name, said in account["problems"].items():
         for index, target in enumerate(account["targets"]):
-            our, their = (best(rows, name, target, ours=ours) for ours in (True, False))
+            our, their = (
+                best(rows, name, target, ours=ours, quantity=said["norm"]) for ours in (True, False)
+            )
             goal = said["goals"][index] if index < len(said["goals"]) else None
             ratio = their.microseconds / our.microseconds if our and their else None
             # Where no public solver arrives, to arrive is all there is to do.
@@ -105,16 +127,19 @@ def standings(account: Mapping[str, Any]) -> list[dict[str, Any]]:
 
 
 def _said(found: Best | None) -> dict[str, Any] | None:
-    return None if found is None else {"name": found.name, "us": found.microseconds}
+    if found is None:
+        return None
+    kept = {key: found.row[f"{key}_us"] for key in ("median", "worst", "cpu")}
+    return {"name": found.name, "us": found.microseconds, **kept}
 
 
 def table(account: Mapping[str, Any]) -> str:
     """What a person reads: the standings and all that belongs to them."""
-    lines = ["time of a whole integration, best of the runs; error: attitude at the end"]
+    lines = ["time of a whole integration, best of the runs (worst in brackets); error at the end"]
     for name, said in account["problems"].items():
-        lines += ["", f"{name}: {said['description']}, {said['end_s']:g} s"]
+        lines += ["", f"{name}: {said['description']}, {said['end_s']:g} s; error: {said['norm']}"]
         lines.append(
-            f"  {'error':>6}  {'ours, µs':>9}  {'by':<28}{'peer, µs':>10}  {'by':<28}"
+            f"  {'error':>6}  {'ours, µs':>18}  {'by':<28}{'peer, µs':>18}  {'by':<28}"
             f"{'x':>6}{'goal':>7}"
         )
         for standing in account["best"]:
@@ -122,8 +147,8 @@ def table(account: Mapping[str, Any]) -> str:
                 continue
             ratio, goal = standing["ratio"], standing["goal"]
             lines.append(
-                f"  {standing['target']:>6.0e}  {_cells(standing['ours'], 9)}"
-                f"{_cells(standing['peer'], 10)}"
+                f"  {standing['target']:>6.0e}  {_cells(standing['ours'], 18)}"
+                f"{_cells(standing['peer'], 18)}"
                 f"{'-' if ratio is None else f'{ratio:.2g}':>6}"
                 f"{'-' if goal is None else f'{goal:g}':>7}"
                 + ("  missed" if standing["verdict"] == "missed" else "")
@@ -140,19 +165,22 @@ def table(account: Mapping[str, Any]) -> str:
 
 
 def _long_runs(drift: Rows) -> list[str]:
-    """The energy at the end of the long runs, with how it grew."""
+    """Energy and phase at the end of the long runs, with how they grew."""
     lines = (
-        ["", "long runs: largest relative error of the energy, growing as steps^p"] if drift else []
+        ["", "long runs: largest relative error of the energy, and rad of the phase, as steps^p"]
+        if drift
+        else []
     )
     for row in drift:
-        if row["quantity"] != "energy":
+        if row["quantity"] not in ("energy", ATTITUDE):
             continue
         grown = "-"
         if row["exponent"] is not None:
             grown = f"{row['exponent']:.2f} ± {row['exponent_error']:.2f}"
         lines.append(
-            f"  {row['problem']:<12}{row['contestant']:<18}{row['steps']:>12,} steps of"
-            f" {row['step']:g} s{row['largest']:>10.1e}   p = {grown}"
+            f"  {row['problem']:<12}{row['contestant']:<22}{row['steps']:>12,} steps of"
+            f" {row['step']:g} s  {row['quantity'].split()[0]:<9}{row['largest']:>9.1e}"
+            f"   p = {grown}" + (f"; {row['failure']}" if row["failure"] else "")
         )
     return lines
 
@@ -160,7 +188,8 @@ def _long_runs(drift: Rows) -> list[str]:
 def _cells(found: Mapping[str, Any] | None, width: int) -> str:
     if found is None:
         return f"{'-':>{width}}  {'-':<28}"
-    return f"{found['us']:>{width}.4g}  {found['name']:<28}"
+    time = f"{found['us']:.4g} ({found['worst']:.4g})"
+    return f"{time:>{width}}  {found['name']:<28}"
 
 
 def write_report(account: Mapping[str, Any], out: Path) -> list[Path]:
@@ -185,8 +214,8 @@ _PAGE: Final = Path(__file__).resolve().parents[3] / "templates" / "precision.ht
 _SHOWN: Final = 7
 _COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7f3c8d")
 _PEERS: Final = {
-    "heyoka": "#000000", "odeint": "#8a5a00", "Eigen": "#777777", "SciPy": "#999999",
-    "MuJoCo": "#bbbbbb",
+    "heyoka": "#000000", "odeint": "#8a5a00", "SUNDIALS": "#b8860b", "Eigen": "#777777",
+    "SciPy": "#999999", "MuJoCo": "#bbbbbb", "Pinocchio": "#a0a0d0", "Bullet": "#d0a0a0",
 }  # fmt: skip
 
 
@@ -199,7 +228,8 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
         for (of, name), ladder in by_contestant(account["rows"]).items()
         if of == problem
     }
-    chosen = _ahead(ladders)
+    norm = account["problems"][problem]["norm"]
+    chosen = _ahead(ladders, norm)
     figure = Figure(figsize=(8.6, 5.6), layout="constrained")
     ax = figure.subplots()
     colours = iter(_COLOURS)
@@ -207,13 +237,13 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
         ladder = [
             row
             for row in ladders[name]
-            if row["failure"] is None and 0 < row["errors"].get(ATTITUDE, -1) < 1
+            if row["failure"] is None and 0 < row["errors"].get(norm, -1) < 1
         ]
         family = ladders[name][0]["family"]
         ours = family == "hamotor"
         ax.plot(
             [row["best_us"] for row in ladder],
-            [row["errors"][ATTITUDE] for row in ladder],
+            [row["errors"][norm] for row in ladder],
             marker="o" if ours else "s", markersize=3, linewidth=1.6 if ours else 1.1,
             linestyle="-" if ours else "--", label=name,
             color=next(colours) if ours else _PEERS[family],
@@ -223,7 +253,7 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel("time of the whole integration, µs (best of the runs)")
-    ax.set_ylabel("error of the attitude at the end, rad")
+    ax.set_ylabel(f"error at the end: {norm}")
     ax.set_title(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
     figure.legend(loc="outside right upper", fontsize=8, frameon=False)
     files = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
@@ -234,7 +264,7 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
     return files
 
 
-def leaders(rows: Rows, problem: str) -> list[str]:
+def leaders(rows: Rows, problem: str, norm: str) -> list[str]:
     """Our methods that take at most twice the least time to some error, a decade each."""
     ladders = {
         ladder[0]["contestant"]: ladder
@@ -244,7 +274,9 @@ def leaders(rows: Rows, problem: str) -> list[str]:
     leading: set[str] = set()
     for decade in range(3, 14):
         times = {
-            name: min((row["best_us"] for row in meeting(ladder, 10.0**-decade)), default=None)
+            name: min(
+                (row["best_us"] for row in meeting(ladder, 10.0**-decade, norm)), default=None
+            )
             for name, ladder in ladders.items()
         }
         least = min((t for t in times.values() if t is not None), default=0.0)
@@ -252,14 +284,14 @@ def leaders(rows: Rows, problem: str) -> list[str]:
     return [name for name in ladders if name in leading]
 
 
-def _ahead(ladders: Mapping[str, Rows]) -> list[str]:
+def _ahead(ladders: Mapping[str, Rows], norm: str) -> list[str]:
     """Ours by how many decades of error they reach first, and one of each public solver."""
     decades = [10.0**-k for k in range(3, 13)]
     score: dict[str, float] = {}
     fastest: dict[tuple[str, float], float] = {}
     for name, ladder in ladders.items():
         for target in decades:
-            times = [row["best_us"] for row in meeting(ladder, target)]
+            times = [row["best_us"] for row in meeting(ladder, target, norm)]
             if times:
                 fastest[name, target] = min(times)
 

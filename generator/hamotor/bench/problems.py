@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from fractions import Fraction
@@ -15,12 +16,12 @@ from typing import Any, Final
 import numpy as np
 
 from hamotor.bench import endpoint
-from hamotor.bench.endpoint import Endpoint
-from hamotor.errors import UsageError
+from hamotor.bench.endpoint import ATTITUDE, POSITION, Endpoint
+from hamotor.errors import HamotorError, UsageError
 from hamotor.run.build import default_cache, default_includes, headers_digest
 from hamotor.run.library import SceneLibrary
 from hamotor.run.simulation import Simulation, load
-from hamotor.scene import Scene
+from hamotor.scene import Scene, find_scene
 
 ROOT: Final = Path(__file__).resolve().parents[3]
 SCENES: Final = ROOT / "tests" / "bench" / "problems"
@@ -58,12 +59,19 @@ class Problem:
 
     name: str
     simulation: Simulation
+    text: str | Path = ""
+    """What names the scene's text; "" where it has none."""
 
     @cached_property
     def scene(self) -> Any:
         """What the simulation was made from."""
         assert self.simulation.read is not None
         return self.simulation.read()
+
+    @property
+    def algebra(self) -> str:
+        """The scene's own."""
+        return str(self.scene.algebra)
 
     @cached_property
     def reference(self) -> Reference:
@@ -74,6 +82,17 @@ class Problem:
         return _computed(self.simulation)
 
     @cached_property
+    def norm(self) -> str:
+        """The quantity whose error the targets are for: attitude, where there is none position."""
+        known = self.reference.end
+        return next((q for q in (ATTITUDE, POSITION) if q in known), next(iter(known)))
+
+    @cached_property
+    def conformal(self) -> Problem | str:
+        """The same motion in conformal algebra, or why there is none."""
+        return _conformal(self)
+
+    @cached_property
     def for_peers(self) -> Mapping[str, Any] | str:
         """The numbers that public solvers are given, or why they are not."""
         return _for_peers(self.scene)
@@ -82,7 +101,40 @@ class Problem:
 def problem(name: str) -> Problem:
     """One of the benchmark's own problems, a bundled scene or a scene file.  Raises UsageError."""
     own = SCENES / f"{name}.toml"
-    return Problem(Path(name).stem, load(own if own.is_file() else name))
+    text = own if own.is_file() else name
+    return Problem(Path(name).stem, load(text), text)
+
+
+_TWINS: Final = {"pga3": ("cga3", "SE3"), "pga2": ("cga2", "SE2")}
+
+
+def _conformal(one: Problem) -> Problem | str:
+    """The scene's text with another algebra and group."""
+    scene = one.scene
+    if not isinstance(scene, Scene) or not one.text:
+        return "only rigid bodies are put into conformal algebra"
+    fixed = not scene.group.translates
+    if fixed and (scene.interactions or any(any(b.center_of_mass) for b in scene.bodies)):
+        return "conformal algebra has no group of rotations alone, which would hold a point fixed"
+    algebra, group = _TWINS[scene.algebra]
+    lines = find_scene(one.text)[0].decode("utf-8").splitlines()
+    first_table = next((i for i, line in enumerate(lines) if line.startswith("[")), len(lines))
+    kept = [
+        line
+        for i, line in enumerate(lines)
+        if i >= first_table or not re.match(r"\s*(algebra|group)\s*=", line)
+    ]
+    file = default_cache() / "twins" / f"{one.name}.toml"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    unfinished = file.with_name(f".{os.getpid()}-{file.name}")
+    unfinished.write_text(
+        "\n".join([f'algebra = "{algebra}"', f'group = "{group}"', *kept]) + "\n", encoding="utf-8"
+    )
+    unfinished.replace(file)
+    try:
+        return Problem(one.name, load(file))
+    except HamotorError as refusal:
+        return str(refusal).splitlines()[0]
 
 
 def own_problems() -> list[str]:

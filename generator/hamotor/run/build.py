@@ -295,6 +295,7 @@ def compile_scene(
     *,
     includes: Sequence[Path] | None = None,
     libraries: Sequence[Path] = (),
+    links: Sequence[str] = (),
     scalar: str = "double",
     cache: Path | None = None,
     on_compile: Callable[[], None] = lambda: None,
@@ -302,7 +303,7 @@ def compile_scene(
     """Compile the C++ text of a scene to a shared library, or find it compiled already.
 
     `libraries` are folders of headers that others maintain: a version is what distinguishes them.
-    `scalar` is what the scene calculates with.
+    `links` are options that name what to link with.  `scalar` is what the scene calculates with.
 
     `on_compile` is called before the compiler starts, and not where it need not.
 
@@ -314,7 +315,7 @@ def compile_scene(
     requirement = requirement_of(scalar, platform.machine())
     compiler = find_compiler(cache, requirement)
     flags = flags_for(platform.machine())
-    links = () if requirement is None else requirement.links
+    links = (*links, *(() if requirement is None else requirement.links))
     key = hashlib.sha256(
         json.dumps(
             [

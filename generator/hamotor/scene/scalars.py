@@ -11,6 +11,9 @@ from hamotor.scene.exact import DIGITS, decimal
 NAMES = ("double", "float", "long_double", "quad", "mpfr")
 DEFAULT_DIGITS = 50
 """Of MPFR's numbers."""
+COUNTED = "counted"
+"""Doubles that count operations, for benchmarks."""
+_HEADERS = {"mpfr": "hamotor/mpfr.hpp", COUNTED: "hamotor/counted.hpp"}
 
 
 @dataclass(frozen=True)
@@ -23,18 +26,22 @@ class Scalar:
     @property
     def cpp(self) -> str:
         """Its C++ type."""
-        own = {"quad": "hamotor::scalar::Quad", "mpfr": f"hamotor::Mpfr<{self.digits}>"}
+        own = {
+            "quad": "hamotor::scalar::Quad",
+            "mpfr": f"hamotor::Mpfr<{self.digits}>",
+            COUNTED: "hamotor::Counted",
+        }
         return own.get(self.name) or self.name.replace("_", " ")
 
     @property
     def header(self) -> str:
         """What must be included for it; "" for those of the language."""
-        return "hamotor/mpfr.hpp" if self.name == "mpfr" else ""
+        return _HEADERS.get(self.name, "")
 
     @property
     def is_wide(self) -> bool:
         """Whether it has more digits than a double."""
-        return self.name not in {"double", "float"}
+        return self.name not in {"double", "float", COUNTED}
 
     @property
     def constant(self) -> str:
@@ -58,10 +65,13 @@ class Scalar:
 
 
 def parse_scalar(word: str) -> Scalar:
-    """The scalar of this name; `mpfr40` has 40 digits, `mpfr` `DEFAULT_DIGITS`.  UsageError."""
+    """The scalar of this name; `mpfr40` has 40 digits, `mpfr` `DEFAULT_DIGITS`.  UsageError.
+
+    `COUNTED` is known as well, and not offered: it is a double to whom only benchmarks listen.
+    """
     found = re.fullmatch(r"(mpfr)([0-9]{1,4})", word)
     name, digits = (found[1], int(found[2])) if found else (word, DEFAULT_DIGITS)
-    if name not in NAMES:
+    if name not in (*NAMES, COUNTED):
         raise UsageError(
             f'unknown scalar "{word}"; there is {", ".join(NAMES)}.{suggest(word, NAMES)}'
         )

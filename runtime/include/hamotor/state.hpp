@@ -112,10 +112,17 @@ concept PoweredSystem = GeneralSystem<System> && requires(const System& system) 
 template <class System>
 using StateOf = State<typename System::Group, System::bodies, typename System::Scalar>;
 
+/// Tells a scalar that counts (counted.hpp) that rates or forques are evaluated so many times.
+template <class S>
+constexpr void note_evaluations([[maybe_unused]] int times) noexcept {
+  if constexpr (requires { S::note_evaluations(times); }) S::note_evaluations(times);
+}
+
 /// The gradient of H at a state and a time; a separable system's forque only where it has one.
 template <HamiltonianSystem System>
 [[nodiscard]] constexpr auto gradient(const System& system, const StateOf<System>& state,
                                       const typename System::Scalar& t) noexcept {
+  note_evaluations<typename System::Scalar>(1);
   if constexpr (GeneralSystem<System>) {
     return system.gradient(state, t);
   } else {

@@ -343,6 +343,7 @@ class Splitting {
   [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state,
                                           const S& /*t*/, const S& h) noexcept {
     if constexpr (takes_whole_steps) {
+      if constexpr (System::has_forque) note_evaluations<S>(static_cast<int>(stages));
       add(state, system.split_step(state.motors, state.momenta, h, weights));
     } else {
       StateOf<System> there = state;
@@ -361,8 +362,12 @@ class Splitting {
           there.momenta[i] = state.momenta[i] + change.momenta[i];
         }
       };
+      const auto find_forque = [&](const auto& motors) {
+        note_evaluations<S>(1);
+        known_.forque = system.forque(motors);
+      };
       if constexpr (opens_with_kick) {
-        if (!(known_.at == state.motors && known_.any)) known_.forque = system.forque(state.motors);
+        if (!(known_.at == state.motors && known_.any)) find_forque(state.motors);
         kick(weights.kicks[0]);
       }
       for (std::size_t k = 0; k < stages; ++k) {
@@ -372,7 +377,7 @@ class Splitting {
           if (last) moves(system.spin_change(there.motors, there.momenta, h));
         }
         if (opens_with_kick || !last) {
-          known_.forque = system.forque(there.motors);
+          find_forque(there.motors);
           kick(weights.kicks[k + 1]);
         }
       }

@@ -202,6 +202,7 @@ class Taylor {
 
   constexpr void expand() noexcept {
     ++steps_;
+    note_evaluations<S>(length_);
     if constexpr (detail::is_packed<Recurrence, S>) {
       rows_.expand(coefficients_, static_cast<std::size_t>(length_));
       reach_ = reach_of_coefficients();

@@ -90,18 +90,35 @@ def rates(problem: Problem, x: Sequence[Any], sqrt: Callable[[Any], Any] = math.
     return [*found, *spin, *x[10:13], *speed]
 
 
+class Watch:
+    """Seconds of each repetition, and how many of them this thread had the processor."""
+
+    def __init__(self) -> None:
+        self.seconds: Vector = []
+        self.processor: Vector = []
+
+    def time(self, work: Callable[[], Any]) -> Any:
+        """Do the work once and return its answer."""
+        had = time.thread_time()
+        began = time.perf_counter()
+        answer = work()
+        self.seconds.append(time.perf_counter() - began)
+        self.processor.append(time.thread_time() - had)
+        return answer
+
+
 class Result:
-    """What one setting gave: seconds of each repetition and the last state."""
+    """What one setting gave: times of each repetition, the last state, what it took."""
 
     def __init__(
-        self, seconds: Vector, state: Vector, steps: int | None, evaluations: int | None
+        self, watch: Watch, state: Vector, steps: int | None, evaluations: int | None
     ) -> None:
-        self.seconds, self.state = seconds, state
+        self.seconds, self.processor, self.state = watch.seconds, watch.processor, state
         self.steps, self.evaluations = steps, evaluations
 
 
 class Compiled:
-    """The C++ of `solvers.cpp`. `setting` is the tolerance, or the number of steps."""
+    """A library of `timing.hpp`. `setting` is the tolerance, or the number of steps."""
 
     class _Problem(ctypes.Structure):
         _fields_ = (
@@ -127,18 +144,20 @@ class Compiled:
 
     def run(self, repetitions: int) -> Result:
         """Integrate from the start `repetitions` times."""
-        seconds = (ctypes.c_double * repetitions)()
+        seconds, processor = ((ctypes.c_double * repetitions)() for _ in range(2))
         state = (ctypes.c_double * 13)(*self._problem.state)
         counts = (ctypes.c_int64 * 2)()
         refused = self._time(
             self._problem.kind.encode(), ctypes.byref(self._c), self._solver,
             ctypes.c_double(self._problem.end), ctypes.c_double(self._setting),
-            ctypes.c_int64(repetitions), seconds, state, counts,
+            ctypes.c_int64(repetitions), seconds, processor, state, counts,
         )  # fmt: skip
         if refused:
-            raise Refused("the step became too small" if refused == 2 else "unknown solver")
+            raise Refused("the solver gave up" if refused == 2 else "unknown solver")
+        watch = Watch()
+        watch.seconds, watch.processor = list(seconds), list(processor)
         last = list(state)[: len(self._problem.state)]
-        return Result(list(seconds), last, counts[0], counts[1])
+        return Result(watch, last, counts[0], counts[1])
 
 
 class Heyoka:
@@ -161,27 +180,27 @@ class Heyoka:
         self.set_up_s = time.perf_counter() - began
         self._problem = problem
         self._integrator.propagate_until(problem.end)
-        self._empty = min(self._call() for _ in range(50))
+        idle = Watch()
+        for _ in range(50):
+            idle.time(self._propagate)
+        self._idle_s, self._idle_processor_s = min(idle.seconds), min(idle.processor)
 
-    def _call(self) -> float:
-        """Seconds of a call from Python that has nothing to do."""
-        began = time.perf_counter()
-        self._integrator.propagate_until(self._problem.end)
-        return time.perf_counter() - began
+    def _propagate(self) -> Any:
+        return self._integrator.propagate_until(self._problem.end)
 
     def run(self, repetitions: int) -> Result:
         """The same; the time of a call that has nothing to do is taken off."""
-        integrator, end = self._integrator, self._problem.end
-        seconds = []
+        integrator = self._integrator
+        watch = Watch()
         for _ in range(repetitions):
             integrator.time = 0.0
             integrator.state[:] = self._problem.state
-            began = time.perf_counter()
-            answer = integrator.propagate_until(end)
-            seconds.append(time.perf_counter() - began - self._empty)
+            answer = watch.time(self._propagate)
+        watch.seconds = [max(s - self._idle_s, 0.0) for s in watch.seconds]
+        watch.processor = [max(s - self._idle_processor_s, 0.0) for s in watch.processor]
         steps = int(answer[3])
         state = [float(x) for x in integrator.state]
-        return Result(seconds, state, steps, steps * integrator.order)
+        return Result(watch, state, steps, steps * integrator.order)
 
 
 class SciPy:
@@ -196,21 +215,23 @@ class SciPy:
     def run(self, repetitions: int) -> Result:
         """The same."""
         problem = self._problem
+        relative = max(self._setting, 3e-14)  # the least that it takes
 
         def rate(_: float, x: Any) -> list[Any]:
             return rates(problem, x.tolist())
 
-        seconds = []
-        for _ in range(repetitions):
-            began = time.perf_counter()
-            found = self._solve(
+        def solve() -> Any:
+            return self._solve(
                 rate, (0.0, problem.end), problem.state, method=self._method,
-                rtol=self._setting, atol=self._setting, t_eval=[problem.end],
+                rtol=relative, atol=self._setting, t_eval=[problem.end],
             )  # fmt: skip
-            seconds.append(time.perf_counter() - began)
+
+        watch = Watch()
+        for _ in range(repetitions):
+            found = watch.time(solve)
         if not found.success:
             raise Refused(found.message)
-        return Result(seconds, [float(x) for x in found.y[:, -1]], None, int(found.nfev))
+        return Result(watch, [float(x) for x in found.y[:, -1]], None, int(found.nfev))
 
 
 class MuJoCo:
@@ -266,14 +287,12 @@ class MuJoCo:
         turn, spin = problem.state[:4], problem.state[4:7]
         place, speed = problem.state[7:10], problem.state[10:13]
         ball = problem.kind == "top"
-        seconds = []
+        watch = Watch()
         for _ in range(repetitions):
             mujoco.mj_resetData(model, data)
             data.qpos[:] = turn if ball else [*(place or [0.0] * 3), *turn]
             data.qvel[:] = spin if ball else [*(speed or [0.0] * 3), *spin]
-            began = time.perf_counter()
-            mujoco.mj_step(model, data, self._steps)
-            seconds.append(time.perf_counter() - began)
+            watch.time(lambda: mujoco.mj_step(model, data, self._steps))
         if any(int(w.number) for w in data.warning):
             raise Refused("MuJoCo warns that the simulation is unstable")
         at = 0 if ball else 3
@@ -281,7 +300,7 @@ class MuJoCo:
         if problem.moves:
             state += [*data.qpos[:3], *data.qvel[:3]]
         steps = self._steps
-        return Result(seconds, [float(x) for x in state], steps, None)
+        return Result(watch, [float(x) for x in state], steps, None)
 
 
 MAKERS: Mapping[str, Callable[..., Any]] = {
@@ -290,6 +309,10 @@ MAKERS: Mapping[str, Callable[..., Any]] = {
     "scipy": SciPy,
     "mujoco": MuJoCo,
 }
+
+
+PACKAGES = ("heyoka", "scipy", "mujoco", "pybullet", "pin")
+"""Those that come from PyPI."""
 
 
 def version(package: str) -> str | None:

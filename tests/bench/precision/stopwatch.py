@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import json
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from statistics import median
@@ -43,18 +44,20 @@ class CompiledScene:
 
     def run(self, repetitions: int) -> peers.Result:
         """Integrate from the start `repetitions` times."""
-        seconds = (ctypes.c_double * repetitions)()
+        seconds, processor = ((ctypes.c_double * repetitions)() for _ in range(2))
         row = (ctypes.c_double * self._columns)()
         steps = ctypes.c_int64()
         calls = int(self._setting["calls"])
         done = self._time(
             *self._functions, self._method, ctypes.c_double(self._setting["step"]),
             ctypes.c_double(self._setting["tolerance"]), self._state, ctypes.c_int64(calls),
-            ctypes.c_int64(repetitions), seconds, row, ctypes.byref(steps),
+            ctypes.c_int64(repetitions), seconds, processor, row, ctypes.byref(steps),
         )  # fmt: skip
         if done < calls:
             raise peers.Refused(f"not finite after {done} of {calls} steps")
-        return peers.Result(list(seconds), list(row), steps.value, None)
+        watch = peers.Watch()
+        watch.seconds, watch.processor = list(seconds), list(processor)
+        return peers.Result(watch, list(row), steps.value, None)
 
 
 class Entry:
@@ -63,6 +66,7 @@ class Entry:
     def __init__(self, contestant: int, setting: int, timed: Any) -> None:
         self.contestant, self.setting, self.timed = contestant, setting, timed
         self.seconds: list[float] = []
+        self.processor_s = float("inf")
         self.last: peers.Result | None = None
 
     def run(self) -> None:
@@ -71,6 +75,7 @@ class Entry:
         batch = min(max(int(_BATCH_S / max(known, 1e-9)), 1), _LARGEST_BATCH)
         self.last = self.timed.run(batch)
         self.seconds += self.last.seconds
+        self.processor_s = min(self.processor_s, *self.last.processor)
 
     def row(self) -> dict[str, Any]:
         """What is written of it."""
@@ -81,6 +86,7 @@ class Entry:
             "best_s": min(self.seconds),
             "median_s": median(self.seconds),
             "worst_s": max(self.seconds),
+            "processor_s": self.processor_s,
             "runs": len(self.seconds),
             "set_up_s": self.timed.set_up_s,
             "final": self.last.state,
@@ -117,6 +123,31 @@ def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
                     entry.run()
         for entry in entries:
             yield entry.row()
+    for index, asked in enumerate(job.get("long_runs", ())):
+        yield {"long_run": index, **long_run(asked, job["problems"][asked["problem"]])}
+
+
+def long_run(asked: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
+    """States of a peer after every so many steps, up to `samples`; fewer steps if it is slow."""
+    every = asked["every"]
+    began = time.perf_counter()
+    states: list[list[float]] = []
+    try:
+        while not states:
+            problem = peers.Problem({**said, "end": every * asked["step"]})
+            setting = asked["tolerance"] or every
+            timed = peers.MAKERS[asked["kind"]](problem, setting, **asked["options"])
+            first = min(timed.run(1).seconds)
+            if every > 1 and first * asked["samples"] > asked["longest_s"]:
+                every = max(int(every * asked["longest_s"] / (first * asked["samples"])), 1)
+                continue
+            for _ in range(asked["samples"]):
+                problem.state = timed.run(1).state
+                states.append(problem.state)
+    except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as met:
+        return {"every": every, "states": states, "failure": str(met)}
+    seconds = time.perf_counter() - began
+    return {"every": every, "states": states, "seconds": seconds, "failure": None}
 
 
 def _timed(
@@ -133,7 +164,7 @@ def _timed(
 def main() -> None:
     """Read the job and write its rows; or only which peers there are, without a job."""
     if len(sys.argv) < 2:
-        found = {name: peers.version(name) for name in ("heyoka", "scipy", "mujoco")}
+        found = {name: peers.version(name) for name in peers.PACKAGES}
         print(json.dumps({"python": sys.version.split()[0], **found}))
         return
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))

@@ -1,0 +1,208 @@
+"""Public solvers beside ours: which there are, with which settings, and how each is tuned."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final
+
+from hamotor.bench.account import say
+from hamotor.bench.contest import Contestant, Extent, Form, environment, step_ladder, tolerances
+from hamotor.bench.problems import ROOT
+from hamotor.errors import ToolError
+from hamotor.run.build import compile_scene, eigen
+
+BENCH: Final = ROOT / "tests" / "bench" / "precision"
+PEERS_PYTHON: Final = ROOT / ".hamotor" / "peers" / "solvers" / "bin" / "python"
+INSTALL: Final = "./hamotor bench precision --with-peers"
+INSTALL_SUNDIALS: Final = "sudo apt-get install libsundials-dev"
+
+TUNED: Final[Mapping[str, str]] = {
+    "odeint": "Boost.odeint: states of fixed size in std::array, controlled steppers from a first "
+    "step of 0.01 s, absolute tolerance = relative.",
+    "Eigen": "Eigen: the classical Runge-Kutta method as one writes it, vectors of fixed size, "
+    "the quaternion normalised after each step.",
+    "SUNDIALS": "SUNDIALS: serial vectors over the caller's array, absolute tolerance = relative, "
+    "a stop time in place of interpolation, no limit of steps. CVODE with Adams' methods of order "
+    "1 to 12 and fixed-point iteration, since nothing is stiff; ARKODE's explicit pairs that are "
+    "its defaults of orders 5 and 8.",
+    "heyoka": "heyoka: compact_mode off, with and without fast_math; its compilation and the time "
+    "of a call that has nothing to do are taken off; its steps × order stand as evaluations.",
+    "SciPy": "SciPy: solve_ivp with rates in plain Python floats, which is faster than NumPy for "
+    "so few numbers; only the end is asked for.",
+    "MuJoCo": "MuJoCo: a ball or free joint, contacts and constraints off, all steps in one call.",
+}
+"""How it is done that nobody is slower than it need be."""
+
+_THEIRS: Final = Form(kernels="", representation="own")
+_ODEINT: Final = ("odeint rkf78", "odeint dopri5", "odeint Bulirsch-Stoer")
+_SUNDIALS: Final = ("CVODE Adams", "ARKODE ERK 5", "ARKODE ERK 8")
+_INCLUDES: Final = ("/usr/include", "/usr/local/include", "/opt/homebrew/include")
+_PYTHON_IS_SLOWER: Final = 40
+"""How many times as long as others those may take that are called from Python."""
+_TIGHT: Final = 1e-14
+
+
+def install_peers() -> None:
+    """Install the public solvers from PyPI into an environment of their own."""
+    say("installing the public solvers of PyPI")
+    done = subprocess.run(
+        (sys.executable, "-m", "tests.peers.environment", "solvers"), cwd=ROOT, check=False
+    )
+    if done.returncode:
+        say("hamotor bench: not all peers could be installed; the others are measured")
+
+
+def stopwatch(*arguments: str) -> subprocess.Popen[str]:
+    """The process that times, in the peers' environment where there is one."""
+    python = PEERS_PYTHON if PEERS_PYTHON.is_file() else Path(sys.executable)
+    return subprocess.Popen(
+        (str(python), "-m", "tests.bench.precision.stopwatch", *arguments),
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def peers_here(gaps: dict[str, str]) -> dict[str, str]:
+    """Versions of the public solvers there are; what is missing goes to `gaps`."""
+    with stopwatch() as answering:
+        assert answering.stdout is not None
+        versions = json.loads(answering.stdout.read() or "{}")
+    for package, version in versions.items():
+        if version is None:
+            gaps[package] = f"not installed: {INSTALL}"
+    found = {package: version for package, version in versions.items() if version is not None}
+    boost = _version_in("boost/version.hpp", "#define BOOST_LIB_VERSION")
+    if boost is None:
+        gaps["odeint"] = "not installed: sudo apt-get install libboost-dev"
+    else:
+        found["boost"] = boost.replace("_", ".")
+    sundials = _version_in("sundials/sundials_config.h", "#define SUNDIALS_VERSION ")
+    if sundials is None:
+        gaps["SUNDIALS"] = f"not installed: {INSTALL_SUNDIALS}"
+    else:
+        found["sundials"] = sundials
+    return found
+
+
+def _version_in(header: str, line: str) -> str | None:
+    for root in _INCLUDES:
+        file = Path(root) / header
+        if file.is_file():
+            for text in file.read_text(encoding="utf-8").splitlines():
+                if text.startswith(line):
+                    return text.split('"')[1]
+    return None
+
+
+def compiled(compiler: str, file: str, *links: str) -> str:
+    """The library of one of the benchmark's C++ files."""
+    with environment(CXX=compiler):
+        built = compile_scene(
+            (BENCH / file).read_text(encoding="utf-8"),
+            includes=(BENCH,),
+            libraries=(eigen(),),
+            links=links,
+        )
+    return str(built.library)
+
+
+def libraries(
+    compilers: Sequence[str], peers: Mapping[str, str], gaps: dict[str, str]
+) -> list[tuple[str, str, str, Sequence[str]]]:
+    """Solvers in C++ with controlled steps: compiler, family, library, names."""
+    found: list[tuple[str, str, str, Sequence[str]]] = []
+    for compiler in compilers:
+        if "boost" in peers:
+            found.append((compiler, "odeint", compiled(compiler, "solvers.cpp"), _ODEINT))
+        if "sundials" not in peers:
+            continue
+        links = ("-lsundials_cvode", "-lsundials_arkode", "-lsundials_nvecserial")
+        try:
+            library = compiled(compiler, "sundials.cpp", *links)
+            ctypes.CDLL(library)
+        except (ToolError, OSError) as problem:
+            gaps["SUNDIALS"] = f"{INSTALL_SUNDIALS}; {str(problem).splitlines()[0]}"
+        else:
+            found.append((compiler, "SUNDIALS", library, _SUNDIALS))
+    return found
+
+
+def contestants(
+    name: str,
+    compilers: Sequence[str],
+    peers: Mapping[str, str],
+    extent: Extent,
+    gaps: dict[str, str],
+) -> list[Contestant]:
+    """The public solvers on one problem."""
+    found = []
+
+    def add(
+        who: str, family: str, kind: str, options: Mapping[str, Any], settings: Sequence[float],
+        longest_s: float = extent.longest_s, compiler: str = "", label: str = "",
+        fixed: bool = False,
+    ) -> None:  # fmt: skip
+        found.append(
+            Contestant(
+                problem=name, name=who, family=family, compiler=compiler, kind=kind,
+                settings=settings, longest_s=longest_s, form=_THEIRS, options=label,
+                fixed_steps=fixed, said={"options": options},
+            )
+        )  # fmt: skip
+
+    steps = [float(s["calls"]) for s in step_ladder(1.0, extent)]
+    for compiler, family, library, names in libraries(compilers, peers, gaps):
+        for solver in names:
+            options: Mapping[str, Any] = {"library": library, "solver": solver}
+            settings = tolerances(extent, 1e-16)
+            add(solver, family, "compiled", options, settings, compiler=compiler)
+        if family == "odeint":
+            for solver, of in (("Eigen rk4", "Eigen"), ("odeint rk4", "odeint")):
+                options = {"library": library, "solver": solver}
+                add(solver, of, "compiled", options, steps, compiler=compiler, fixed=True)
+    if "heyoka" in peers:
+        for fast in (False, True):
+            options = {"fast_math": fast}
+            label = "fast_math" * fast
+            add("heyoka", "heyoka", "heyoka", options, tolerances(extent, 1e-16), label=label)
+    slow = _PYTHON_IS_SLOWER * extent.longest_s
+    if "scipy" in peers:
+        coarse = tolerances(extent, 3e-14)
+        for method in ("DOP853", "LSODA"):
+            add(f"SciPy {method}", "SciPy", "scipy", {"method": method}, coarse, slow)
+    if "mujoco" in peers:
+        for integrator in ("RK4", "implicitfast"):
+            who = f"MuJoCo {integrator}"
+            options = {"integrator": integrator}
+            add(who, "MuJoCo", "mujoco", options, steps[::3], slow, fixed=True)
+    return found
+
+
+def long_runs(
+    contestants: Sequence[Contestant], compiler: str, steps_of: Mapping[str, float], steps: int,
+    samples: int, longest_s: float,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """What the stopwatch is asked for: `steps` steps of the scene's, or the time that they take
+    with a tight tolerance, of one of each solver."""
+    samples = min(samples, steps)
+    return [
+        {
+            "problem": c.problem,
+            "name": c.name,
+            "kind": c.kind,
+            "options": c.said["options"],
+            "step": steps_of[c.problem],
+            "every": steps // samples,
+            "samples": samples,
+            "tolerance": 0.0 if c.fixed_steps else _TIGHT,
+            "longest_s": longest_s,
+        }
+        for c in contestants
+        if not c.is_ours and c.compiler in ("", compiler) and not c.options
+    ]

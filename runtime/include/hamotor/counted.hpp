@@ -1,0 +1,115 @@
+// A double that counts what is done with it: operations, and evaluations of a system's gradient.
+//
+// Two numbers that the compiler knows cost nothing, and are not counted.  A multiply-add is one of
+// each.  Comparisons, changes of sign and choices are not counted.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <compare>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <type_traits>
+
+#include "hamotor/scalar.hpp"
+
+namespace hamotor {
+
+/// Double precision; what was done with all numbers of it stands in `counts`.
+class Counted {
+ public:
+  /// What is told apart; the last one is of `state.hpp`.
+  enum Kind : std::size_t { additions, products, quotients, roots, functions, evaluations };
+  static inline std::array<std::int64_t, 6> counts{};
+
+  Counted() = default;
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  constexpr Counted(Number x) noexcept : value_(static_cast<double>(x)) {}
+
+  template <class Number>
+    requires std::is_arithmetic_v<Number>
+  explicit constexpr operator Number() const noexcept {
+    return static_cast<Number>(value_);
+  }
+
+  friend constexpr Counted operator+(const Counted& a, const Counted& b) noexcept {
+    return count(additions, a.value_ + b.value_);
+  }
+  friend constexpr Counted operator-(const Counted& a, const Counted& b) noexcept {
+    return count(additions, a.value_ - b.value_);
+  }
+  friend constexpr Counted operator*(const Counted& a, const Counted& b) noexcept {
+    return count(products, a.value_ * b.value_);
+  }
+  friend constexpr Counted operator/(const Counted& a, const Counted& b) noexcept {
+    return count(quotients, a.value_ / b.value_);
+  }
+  friend constexpr Counted operator-(const Counted& a) noexcept { return -a.value_; }
+  constexpr Counted& operator+=(const Counted& b) noexcept { return *this = *this + b; }
+  constexpr Counted& operator-=(const Counted& b) noexcept { return *this = *this - b; }
+  constexpr Counted& operator*=(const Counted& b) noexcept { return *this = *this * b; }
+  constexpr Counted& operator/=(const Counted& b) noexcept { return *this = *this / b; }
+  friend constexpr bool operator==(const Counted& a, const Counted& b) noexcept {
+    return a.value_ == b.value_;
+  }
+  friend constexpr std::partial_ordering operator<=>(const Counted& a, const Counted& b) noexcept {
+    return a.value_ <=> b.value_;
+  }
+
+  friend Counted sqrt(const Counted& x) noexcept { return count(roots, std::sqrt(x.value_)); }
+#define HAMOTOR_COUNTED(name) \
+  friend Counted name(const Counted& x) noexcept { return count(functions, std::name(x.value_)); }
+  HAMOTOR_COUNTED(sin)
+  HAMOTOR_COUNTED(cos)
+  HAMOTOR_COUNTED(tan)
+  HAMOTOR_COUNTED(sinh)
+  HAMOTOR_COUNTED(cosh)
+  HAMOTOR_COUNTED(tanh)
+  HAMOTOR_COUNTED(asinh)
+  HAMOTOR_COUNTED(exp)
+  HAMOTOR_COUNTED(log)
+  HAMOTOR_COUNTED(asin)
+  HAMOTOR_COUNTED(acos)
+  HAMOTOR_COUNTED(atan)
+#undef HAMOTOR_COUNTED
+  friend Counted floor(const Counted& x) noexcept { return std::floor(x.value_); }
+  friend Counted atan2(const Counted& y, const Counted& x) noexcept {
+    return count(functions, std::atan2(y.value_, x.value_));
+  }
+  friend constexpr Counted fma(const Counted& a, const Counted& b, const Counted& c) noexcept {
+    const Counted twice_rounded = a * b + c;
+    if (std::is_constant_evaluated()) return twice_rounded;
+    return std::fma(a.value_, b.value_, c.value_);
+  }
+
+  static constexpr void note_evaluations(std::int64_t times) noexcept {
+    if (!std::is_constant_evaluated()) counts[evaluations] += times;
+  }
+
+ private:
+  [[nodiscard]] static constexpr Counted count(Kind kind, double value) noexcept {
+    if (!std::is_constant_evaluated() && !__builtin_constant_p(value)) ++counts[kind];
+    return value;
+  }
+
+  double value_ = 0;
+};
+
+template <>
+struct scalar::Limits<Counted> : std::numeric_limits<double> {
+  static constexpr Counted epsilon() noexcept { return std::numeric_limits<double>::epsilon(); }
+  static constexpr Counted max() noexcept { return std::numeric_limits<double>::max(); }
+};
+
+}  // namespace hamotor
+
+/// Writes what was counted since the last call.
+extern "C" [[gnu::used, gnu::visibility("default")]] inline void hamotor_counts(
+    std::int64_t* counts) {
+  std::ranges::copy(hamotor::Counted::counts, counts);
+  hamotor::Counted::counts.fill(0);
+}
