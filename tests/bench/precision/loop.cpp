@@ -16,7 +16,8 @@ using Stop = void (*)(void* run);
 
 /// Runs `repetitions` times from `state`: `calls` steps of the method, or with a tolerance as many
 /// as it takes within each.  Writes the seconds that every `hamotor_advance` took, how many of them
-/// it had the processor, the row of the last state and the steps taken.  Returns how many of `calls` were done, -1 if it did not start.
+/// it had the processor, the row of the last state and the steps taken.  Returns how many of
+/// `calls` were done, -1 if it did not start.
 extern "C" __attribute__((visibility("default"))) std::int64_t time_runs(
     Start start, Advance advance, Observe observe, Steps steps, Stop stop, const char* method,
     double step, double tolerance, const double* state, std::int64_t calls,

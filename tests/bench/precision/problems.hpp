@@ -1,5 +1,5 @@
-// The reference problems as public solvers are given them: rigid bodies in quaternion (w, x, y, z) and
-// body rates, 7 numbers, and for a body that moves also position and velocity in the world, 13.
+// The reference problems as public solvers are given them: rigid bodies in quaternion (w, x, y, z)
+// and body rates, 7 numbers, and for a body that moves also position and velocity in the world, 13.
 #pragma once
 
 #include <array>

@@ -88,8 +88,7 @@ template <class Rates>
 void odeint_rk4(const Rates& rates, State<Rates::size>& x, double end, double steps, Count* count) {
   const auto whole = static_cast<std::int64_t>(steps);
   odeint::runge_kutta4<State<Rates::size>> stepper;
-  odeint::integrate_n_steps(stepper, rates, x, 0.0, end / steps,
-                            static_cast<std::size_t>(whole));
+  odeint::integrate_n_steps(stepper, rates, x, 0.0, end / steps, static_cast<std::size_t>(whole));
   if (count != nullptr) *count = {whole, 4 * whole};
 }
 

@@ -1,4 +1,5 @@
-// SUNDIALS on the reference problems: CVODE's Adams methods and ARKODE's explicit Runge-Kutta pairs.
+// SUNDIALS on the reference problems: CVODE's Adams methods and ARKODE's explicit Runge-Kutta
+// pairs.
 //
 // The equations are not stiff: Adams' corrector is iterated without a Jacobian (Anderson's
 // acceleration off), and its order goes up to 12.  Of ARKODE those pairs that are its defaults of

@@ -69,12 +69,12 @@ int time_solver(std::string_view kind, const Problem& problem, std::string_view 
 }  // namespace bench
 
 /// Exports the solvers of a class with `find<Rates>(name)`; once in a shared library.
-#define HAMOTOR_BENCH_SOLVERS(Solvers)                                                            \
-  extern "C" __attribute__((visibility("default"))) int time_solver(                              \
-      const char* kind, const bench::Problem* problem, const char* name, double end,              \
+#define HAMOTOR_BENCH_SOLVERS(Solvers)                                                             \
+  extern "C" __attribute__((visibility("default"))) int time_solver(                               \
+      const char* kind, const bench::Problem* problem, const char* name, double end,               \
       double setting, std::int64_t repetitions, double* seconds, double* processor, double* state, \
-      std::int64_t* counts) {                                                                     \
-    return bench::time_solver<Solvers>(kind, *problem, name, end, setting, repetitions, seconds,  \
-                                       processor, state, counts);                                 \
-  }                                                                                               \
+      std::int64_t* counts) {                                                                      \
+    return bench::time_solver<Solvers>(kind, *problem, name, end, setting, repetitions, seconds,   \
+                                       processor, state, counts);                                  \
+  }                                                                                                \
   static_assert(true)
