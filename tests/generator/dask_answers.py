@@ -15,7 +15,8 @@ from pathlib import Path
 
 import distributed
 import numpy as np
-from tests.generator.test_ensemble import digest, many
+from tests.generator.test_ensemble import digest
+from tests.generator.toy import ensemble_of_toys
 
 from hamotor.run.dataset import PARTS
 from hamotor.run.ensemble import PART
@@ -27,7 +28,7 @@ END = 40.0
 
 def main(out: Path) -> None:
     """Compute the same ensemble here and there."""
-    here = run_ensemble(many(), MEMBERS, end=END, every=400, keep=[3, 4 * PART])
+    here = run_ensemble(ensemble_of_toys(), MEMBERS, end=END, every=400, keep=[3, 4 * PART])
     found: list[EnsembleRun] = []
     with (
         distributed.LocalCluster(
@@ -40,7 +41,7 @@ def main(out: Path) -> None:
         def compute() -> None:
             found.append(
                 run_ensemble(
-                    many(),
+                    ensemble_of_toys(),
                     MEMBERS,
                     end=END,
                     every=400,

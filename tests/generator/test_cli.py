@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.generator.toy import toy
+from tests.generator.toy import ensemble_of_toys, toy
 
 import hamotor
 from hamotor import testing
@@ -42,6 +42,28 @@ def started(*arguments: str, **options: Any) -> subprocess.Popen[str]:
         text=True,
         **options,
     )
+
+
+def test_an_ensemble_prints_its_summary_and_writes_into_runs(
+    toy_scene: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    many = {"some": ensemble_of_toys(), "none": ensemble_of_toys({"FAIL_MEMBER": 7}, mean=-9.0)}
+    monkeypatch.setattr(simulation, "load", lambda name: many[name])
+    assert main(["run", "some", "--ensemble", "20", "--seed", "2", "--keep", "3,5"]) == 0
+    printed = capsys.readouterr().out
+    assert "20 members, seed 2" in printed
+    assert "members/ (2 trajectories)" in printed
+    folder = toy_scene / "runs" / "toy_ensemble"
+    assert {p.name for p in folder.iterdir()} == {
+        "run.json",
+        "statistics.parquet",
+        "states",
+        "members",
+    }
+    assert main(["run", "some", "--ensemble", "20", "--member", "3", "--json", "--out", "one"]) == 0
+    assert json.loads(capsys.readouterr().out)["ensemble"]["first"] == 3
+    assert main(["run", "none", "--ensemble", "20"]) == 3
+    assert "every member failed" in capsys.readouterr().err
 
 
 def test_run_prints_the_summary_and_writes_into_runs(

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.generator.toy import toy, toy_state
+from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, toy, toy_state
 
 import hamotor
 from hamotor.errors import ToolError, UsageError
@@ -25,35 +25,10 @@ from hamotor.run.ensemble import CHUNK, PART, Job, Part
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
 from hamotor.run.library import SceneLibrary
 from hamotor.run.sampling import starts
-from hamotor.run.simulation import Simulation
 from hamotor.run.statistics import Moments
 from hamotor.scene import parse_scene
-from hamotor.scene.draws import BodyDraws, Draw, Ensemble
 from hamotor.scene.model import Scene
 from hamotor.scene.motors import motor_of, rotation_matrix
-
-RATE, PUSH = 2, 3
-"""Where the toy's momentum has the rate about e3 and the linear momentum along x."""
-
-DRAWS = Ensemble(
-    seed=3,
-    bodies=(
-        BodyDraws(
-            motor=0,
-            momentum=8,
-            momenta=(
-                (RATE, Draw("normal", (-2.0,), (1.0,))),
-                (PUSH, Draw("uniform", (-1.0,), (1.0,))),
-            ),
-        ),
-    ),
-    quantiles=(0.25, 0.5),
-)
-
-
-def many(switches: dict[str, int | str] | None = None, **changes: Any) -> Simulation:
-    """The toy with a drawn rate (mean 0, sd 1) and push (−1 to 1): x(t) = cos t + p sin t."""
-    return toy(switches, ensemble=DRAWS, **{"end": 0.5, "step": 0.05, "every": 5, **changes})
 
 
 def digest(run: EnsembleRun) -> str:
@@ -244,7 +219,7 @@ def test_mistakes_in_ensemble_name_the_key(table: str, message: str) -> None:
 
 def test_statistics_are_those_of_the_members() -> None:
     members = 40
-    run = run_ensemble(many(), members, keep=range(members))
+    run = run_ensemble(ensemble_of_toys(), members, keep=range(members))
     rows = np.array([run.trajectory(k)["bob.position.x"] for k in range(members)])
     assert run.t.tolist() == pytest.approx([0, 0.25, 0.5])
     np.testing.assert_allclose(run.mean("bob.position.x"), rows.mean(axis=0), rtol=1e-14)
@@ -288,15 +263,17 @@ def test_nothing_depends_on_threads_and_a_member_alone_has_its_bits(tmp_path: Pa
     members = PART + CHUNK + 3
     kept = (5, PART + CHUNK + 1)
     settings: dict[str, Any] = {"end": 0.1, "keep": kept}
-    one = run_ensemble(many(), members, threads=1, **settings)
-    three = run_ensemble(many(), members, threads=3, **settings)
+    one = run_ensemble(ensemble_of_toys(), members, threads=1, **settings)
+    three = run_ensemble(ensemble_of_toys(), members, threads=3, **settings)
     assert digest(three) == digest(one)
-    disk = run_ensemble(many(), members, threads=2, out=tmp_path / "run", csv=True, **settings)
+    disk = run_ensemble(
+        ensemble_of_toys(), members, threads=2, out=tmp_path / "run", csv=True, **settings
+    )
     assert digest(disk) == digest(one)
     assert digest(hamotor.open_ensemble(tmp_path / "run")) == digest(one)
     assert (tmp_path / "run" / "statistics.csv").read_text().startswith('"t","members"')
     for member in kept:
-        alone = run_ensemble(many(), members, member=member, end=0.1)
+        alone = run_ensemble(ensemble_of_toys(), members, member=member, end=0.1)
         assert (alone.states[0] == one.states[member]).all()
         for name, values in alone.trajectory(member).items():
             assert (values == one.trajectory(member)[name]).all()
@@ -307,9 +284,9 @@ def test_nothing_depends_on_threads_and_a_member_alone_has_its_bits(tmp_path: Pa
 
 
 def test_a_member_that_fails_is_no_failed_run(tmp_path: Path) -> None:
-    toys = many({"FAIL_MEMBER": 7})
+    toys = ensemble_of_toys({"FAIL_MEMBER": 7})
     run = run_ensemble(toys, 100, out=tmp_path / "run", keep=range(4))
-    negative = run.states[:, 8 + RATE] < 0
+    negative = run.states[:, 8 + RATE_AT] < 0
     assert 30 < negative.sum() < 70
     assert run.failures["member"].tolist() == np.flatnonzero(negative).tolist()
     assert set(run.failures["reason"]) == {"not_finite"}
@@ -328,15 +305,15 @@ def test_a_member_that_fails_is_no_failed_run(tmp_path: Path) -> None:
 
 def test_states_of_ones_own_are_where_members_start() -> None:
     states = np.tile(toy_state(), (3, 1))
-    states[:, 8 + PUSH] = [0.0, 1.0, 2.0]
+    states[:, 8 + PUSH_AT] = [0.0, 1.0, 2.0]
     run = run_ensemble(toy(end=0.5, step=0.05), states=states)
     x = run.states[:, 4] * run.states[:, 0] + run.states[:, 5] * run.states[:, 3]
-    assert -2 * x == pytest.approx(np.cos(0.5) + states[:, 8 + PUSH] * np.sin(0.5), abs=1e-3)
+    assert -2 * x == pytest.approx(np.cos(0.5) + states[:, 8 + PUSH_AT] * np.sin(0.5), abs=1e-3)
     assert run.report["ensemble"]["seed"] is None
 
 
 def test_an_interrupted_ensemble_keeps_what_was_computed(tmp_path: Path) -> None:
-    toys = many({"SLEEP_US": 2000}, end=100.0, every=1)
+    toys = ensemble_of_toys({"SLEEP_US": 2000}, end=100.0, every=1)
     toys.compile(ensembles=True)
     timer = threading.Timer(0.7, lambda: os.kill(os.getpid(), signal.SIGINT))
     timer.start()
@@ -372,7 +349,7 @@ def test_what_cannot_be_is_said_before_anything_is_stepped(
     settings: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(UsageError, match=message):
-        run_ensemble(many(), **settings)
+        run_ensemble(ensemble_of_toys(), **settings)
 
 
 def test_scenes_that_draw_nothing_are_refused() -> None:
@@ -404,7 +381,7 @@ def job_of(
 ) -> tuple[Job, EnsembleRun]:
     """A job of the toy as `run_ensemble` makes it, and what it gives here."""
     jobs: list[Job] = []
-    toys = many()
+    toys = ensemble_of_toys()
     whole = run_ensemble(toys, members, end=0.1, keep=[2], out=tmp_path / "local")
 
     def note(job: Job, *_: Any) -> Any:
@@ -449,7 +426,7 @@ def test_dask_is_an_extra_that_the_error_tells_how_to_install(
     monkeypatch.setitem(sys.modules, "distributed", None)
     message = r"-m pip install --require-hashes -r .*dask.lock"
     with pytest.raises(ToolError, match=message) as caught:
-        run_ensemble(many(), 10, engine="dask")
+        run_ensemble(ensemble_of_toys(), 10, engine="dask")
     assert caught.value.exit_code == 4
     assert cluster.REQUIREMENTS.is_file()
 

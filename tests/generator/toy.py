@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hamotor.run.simulation import Simulation
+from hamotor.scene.draws import BodyDraws, Draw, Ensemble
 
 SOURCE = Path(__file__).with_name("toy_scene.cpp").read_text(encoding="utf-8")
 RATE = 2.0
@@ -40,3 +41,18 @@ def toy(switches: dict[str, int | str] | None = None, **changes: Any) -> Simulat
         "spec_hash": "0123abcd",
     }
     return Simulation(**{**settings, **changes})
+
+
+RATE_AT, PUSH_AT = 2, 3
+"""Where the toy's momentum has the rate about e3 and the linear momentum along x."""
+
+
+def ensemble_of_toys(
+    switches: dict[str, int | str] | None = None, mean: float = 0.0, **changes: Any
+) -> Simulation:
+    """Toys with a drawn rate (sd 1) and push p from -1 to 1: x(t) = cos t + p sin t."""
+    rate = Draw("normal", (mean - RATE,), (1.0,))
+    push = Draw("uniform", (-1.0,), (1.0,))
+    body = BodyDraws(motor=0, momentum=8, momenta=((RATE_AT, rate), (PUSH_AT, push)))
+    draws = Ensemble(seed=3, bodies=(body,), quantiles=(0.25, 0.5))
+    return toy(switches, ensemble=draws, **{"end": 0.5, "step": 0.05, "every": 5, **changes})

@@ -153,7 +153,7 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
     many, timing = said["ensemble"], said["timing"]
     steps = f"{said['steps']:,} steps of {said['step']:.6g} s to t = {said['t_end']:.6g} s"
     who = f"{many['members']:,} members"
-    if many["members"] == 1 and many["first"]:
+    if many["members"] == 1:
         who = f"member {many['first']:,} alone"
     seed = "given states" if many["seed"] is None else f"seed {many['seed']}"
     where = f"{many['threads']} thread{'s' * (many['threads'] != 1)}"
