@@ -199,7 +199,7 @@ def _parser() -> _Parser:
     bench.add_argument(
         "--with-peers",
         action="store_true",
-        help="install heyoka, SciPy and MuJoCo first, to measure precision beside",
+        help="install heyoka, SciPy, MuJoCo, Pinocchio and Bullet first, to measure beside",
     )
     bench.add_argument(
         "--drift",

@@ -223,3 +223,39 @@ def test_every_family_says_how_it_is_tuned() -> None:
     extent = Extent(1, 2.0, 0.001, 0.01, forms=False, compilers=())
     found = solvers.contestants("P1", (), every, extent, gaps)
     assert {c.family for c in found} <= solvers.TUNED.keys()
+
+
+@pytest.mark.skipif(not solvers.PEERS_PYTHON.is_file(), reason="./hamotor bench --with-peers")
+@pytest.mark.parametrize("name", ["P1", "P3", "P4"])
+def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str, tmp_path: Path) -> None:
+    there = solvers.peers_here({})
+    given = problem(name).for_peers
+    assert not isinstance(given, str)
+    first = json.loads((REFERENCES / f"{name}.json").read_text(encoding="utf-8"))["checkpoints"][0]
+    end = float(first["t"])
+    extent = Extent(0, 2.0, 1e9, 0.0, forms=False, compilers=())
+    every = solvers.contestants(name, (), there, extent, {})
+    found = [c for c in every if c.name.endswith("RK4") or c.family == "Bullet"]
+    job = {
+        "rounds": 0,
+        "enough_s": 0.0,
+        "problems": {name: {**given, "end": end}},
+        "contestants": [
+            {
+                "problem": name, "kind": c.kind, "longest_s": 1e9, "settings": [round(end * 1000)],
+                **c.said,
+            }
+            for c in found
+        ],
+    }  # fmt: skip
+    file = tmp_path / "job.json"
+    file.write_text(json.dumps(job), encoding="utf-8")
+    with solvers.stopwatch(str(file)) as timing:
+        assert timing.stdout is not None
+        rows = {found[r["contestant"]].name: r for r in map(json.loads, timing.stdout)}
+    expected = endpoint.of_quaternion(
+        problem(name).scene, [*first["q"], *first["w"], *first.get("x", ()), *first.get("v", ())]
+    )
+    for who, row in rows.items():
+        here = endpoint.of_quaternion(problem(name).scene, row["final"])
+        assert endpoint.errors(here, expected)[ATTITUDE] < (0.3 if who == "Bullet" else 1e-2), who

@@ -35,6 +35,12 @@ TUNED: Final[Mapping[str, str]] = {
     "SciPy": "SciPy: solve_ivp with rates in plain Python floats, which is faster than NumPy for "
     "so few numbers; only the end is asked for.",
     "MuJoCo": "MuJoCo: a ball or free joint, contacts and constraints off, all steps in one call.",
+    "Pinocchio": "Pinocchio: aba and integrate, called from Python; it has no integrator of its "
+    "own, so that RK4 (slopes in the tangent space at the step's start) and semi-implicit Euler "
+    "are written as its users write them.",
+    "Bullet": "Bullet: PyBullet, no damping, no sleeping, one call a step (there is none for "
+    "several). A fixed point is a constraint, a spring a force before each "
+    "step.",
 }
 """How it is done that nobody is slower than it need be."""
 
@@ -181,6 +187,13 @@ def contestants(
             who = f"MuJoCo {integrator}"
             options = {"integrator": integrator}
             add(who, "MuJoCo", "mujoco", options, steps[::3], slow, fixed=True)
+    if "pin" in peers:
+        for integrator in ("RK4", "semi-implicit"):
+            who = f"Pinocchio {integrator}"
+            options = {"integrator": integrator}
+            add(who, "Pinocchio", "pinocchio", options, steps[::3], slow, fixed=True)
+    if "pybullet" in peers:
+        add("Bullet", "Bullet", "bullet", {}, steps[::3], slow, fixed=True)
     return found
 
 

@@ -252,11 +252,7 @@ class MuJoCo:
     def _xml(self, integrator: str) -> str:
         p = self._problem
         top = p.kind == "top"
-        moments = list(p.moments)
-        if top:  # about the centre of mass
-            moments[0] -= p.mass * p.height**2
-            moments[1] -= p.mass * p.height**2
-        inertia = " ".join(repr(m) for m in moments)
+        inertia = " ".join(repr(m) for m in central_moments(p))
         at = " ".join(repr(a) for a in p.at)
         held = p.kind in {"sprung", "loose"}
         gravity = 0.0 if p.kind == "free" else p.gravity
@@ -303,11 +299,210 @@ class MuJoCo:
         return Result(watch, [float(x) for x in state], steps, None)
 
 
+def rotated(q: Sequence[float], v: Sequence[float]) -> Vector:
+    """A vector of the body in the world, for a quaternion (w, x, y, z)."""
+    w, x, y, z = q
+    twice = (
+        2 * (y * v[2] - z * v[1]),
+        2 * (z * v[0] - x * v[2]),
+        2 * (x * v[1] - y * v[0]),
+    )
+    return [
+        v[0] + w * twice[0] + y * twice[2] - z * twice[1],
+        v[1] + w * twice[1] + z * twice[0] - x * twice[2],
+        v[2] + w * twice[2] + x * twice[1] - y * twice[0],
+    ]
+
+
+def seen_from(q: Sequence[float], v: Sequence[float]) -> Vector:
+    """A vector of the world in the body."""
+    return rotated((q[0], -q[1], -q[2], -q[3]), v)
+
+
+def pull(problem: Problem, place: Sequence[float], arm: Sequence[float]) -> Vector:
+    """The spring's force on a body at `place`, held at `arm` from there, both in the world."""
+    reach = [x + a for x, a in zip(place, arm, strict=True)]
+    size = -problem.stiffness
+    if problem.rest_length:
+        size *= 1 - problem.rest_length / math.sqrt(sum(d * d for d in reach))
+    return [size * d for d in reach]
+
+
+def central_moments(problem: Problem) -> Vector:
+    """About the centre of mass: those of a top are about its fixed point."""
+    away = problem.mass * problem.height**2 if problem.kind == "top" else 0.0
+    j1, j2, j3 = problem.moments
+    return [j1 - away, j2 - away, j3]
+
+
+class Bullet:
+    """PyBullet, one step a call; `setting` is the number of steps.
+
+    A top is held by a constraint, a spring by a force before each step.
+    """
+
+    def __init__(self, problem: Problem, setting: float) -> None:
+        self._problem, self._steps = problem, int(setting)
+        began = time.perf_counter()
+        self._bullet = bullet = importlib.import_module("pybullet")
+        if not bullet.isConnected():
+            bullet.connect(bullet.DIRECT)
+        bullet.resetSimulation()
+        bullet.setTimeStep(problem.end / self._steps)
+        bullet.setGravity(0, 0, 0.0 if problem.kind == "free" else -problem.gravity)
+        self._body = bullet.createMultiBody(baseMass=problem.mass)
+        bullet.changeDynamics(
+            self._body, -1, localInertiaDiagonal=central_moments(problem), linearDamping=0,
+            angularDamping=0, maxJointVelocity=1e9, activationState=4,
+        )  # fmt: skip
+        if problem.kind == "top":
+            self._put(problem.state)
+            bullet.createConstraint(
+                self._body, -1, -1, -1, bullet.JOINT_POINT2POINT, [0, 0, 0],
+                [0, 0, -problem.height], [0, 0, 0],
+            )  # fmt: skip
+        self.set_up_s = time.perf_counter() - began
+
+    def _put(self, x: Vector) -> None:
+        q, spin = x[:4], rotated(x[:4], x[4:7])
+        place, speed = x[7:10] or [0.0] * 3, x[10:13] or [0.0] * 3
+        if self._problem.kind == "top":
+            place = rotated(q, [0.0, 0.0, self._problem.height])
+            speed = [
+                spin[1] * place[2] - spin[2] * place[1],
+                spin[2] * place[0] - spin[0] * place[2],
+                spin[0] * place[1] - spin[1] * place[0],
+            ]
+        self._bullet.resetBasePositionAndOrientation(self._body, place, [*q[1:], q[0]])
+        self._bullet.resetBaseVelocity(self._body, speed, spin)
+
+    def _where(self) -> tuple[Vector, Vector]:
+        place, (x, y, z, w) = self._bullet.getBasePositionAndOrientation(self._body)
+        return list(place), [w, x, y, z]
+
+    def _advance(self) -> None:
+        bullet, body, problem = self._bullet, self._body, self._problem
+        held = problem.kind in {"sprung", "loose"}
+        for _ in range(self._steps):
+            if held:
+                place, q = self._where()
+                arm = rotated(q, problem.at)
+                at = [p + a for p, a in zip(place, arm, strict=True)]
+                force = pull(problem, place, arm)
+                bullet.applyExternalForce(body, -1, force, at, bullet.WORLD_FRAME)
+            bullet.stepSimulation()
+
+    def run(self, repetitions: int) -> Result:
+        """The same."""
+        watch = Watch()
+        for _ in range(repetitions):
+            self._put(self._problem.state)
+            watch.time(self._advance)
+        place, q = self._where()
+        speed, spin = self._bullet.getBaseVelocity(self._body)
+        state = [*q, *seen_from(q, spin)]
+        if self._problem.moves:
+            state += [*place, *speed]
+        return Result(watch, state, self._steps, None)
+
+
+class Pinocchio:
+    """Pinocchio's forward dynamics (aba) and integrate, in a loop in Python; `setting` is the
+    number of steps.
+
+    The integrator is ours to write, as it is everybody's: RK4 with all slopes in the tangent
+    space of the step's start, or Euler's with the new velocity.
+    """
+
+    def __init__(self, problem: Problem, setting: float, *, integrator: str) -> None:
+        self._problem, self._steps = problem, int(setting)
+        self._numpy = importlib.import_module("numpy")
+        self._pinocchio = pin = importlib.import_module("pinocchio")
+        began = time.perf_counter()
+        joint = pin.JointModelFreeFlyer() if problem.moves else pin.JointModelSpherical()
+        inertia = pin.Inertia(
+            problem.mass,
+            self._numpy.array([0.0, 0.0, problem.height if problem.kind == "top" else 0.0]),
+            self._numpy.diag(central_moments(problem)),
+        )
+        self._model = pin.Model()
+        index = self._model.addJoint(0, joint, pin.SE3.Identity(), "body")
+        self._model.appendBodyToJoint(index, inertia, pin.SE3.Identity())
+        gravity = 0.0 if problem.kind == "free" else -problem.gravity
+        self._model.gravity.linear = self._numpy.array([0.0, 0.0, gravity])
+        self._data = self._model.createData()
+        self._still = self._numpy.zeros(self._model.nv)
+        self._forces = pin.StdVec_Force()
+        self._forces.extend([pin.Force.Zero(), pin.Force.Zero()])
+        self._step = {"RK4": self._runge_kutta, "semi-implicit": self._euler}[integrator]
+        self._evaluations = {"RK4": 4, "semi-implicit": 1}[integrator]
+        self.set_up_s = time.perf_counter() - began
+
+    def _acceleration(self, q: Any, v: Any) -> Any:
+        problem = self._problem
+        if problem.kind not in {"sprung", "loose"}:
+            return self._pinocchio.aba(self._model, self._data, q, v, self._still)
+        numbers = q.tolist()
+        turn = [numbers[6], *numbers[3:6]]
+        force = seen_from(turn, pull(problem, numbers[:3], rotated(turn, problem.at)))
+        a, b, c = problem.at
+        self._forces[1].linear = self._numpy.array(force)
+        self._forces[1].angular = self._numpy.array(
+            [
+                b * force[2] - c * force[1],
+                c * force[0] - a * force[2],
+                a * force[1] - b * force[0],
+            ]
+        )
+        return self._pinocchio.aba(self._model, self._data, q, v, self._still, self._forces)
+
+    def _runge_kutta(self, q: Any, v: Any, h: float) -> tuple[Any, Any]:
+        integrate, model = self._pinocchio.integrate, self._model
+        a1 = self._acceleration(q, v)
+        v2 = v + h / 2 * a1
+        a2 = self._acceleration(integrate(model, q, h / 2 * v), v2)
+        v3 = v + h / 2 * a2
+        a3 = self._acceleration(integrate(model, q, h / 2 * v2), v3)
+        v4 = v + h * a3
+        a4 = self._acceleration(integrate(model, q, h * v3), v4)
+        moved = integrate(model, q, h / 6 * (v + 2 * v2 + 2 * v3 + v4))
+        return moved, v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+
+    def _euler(self, q: Any, v: Any, h: float) -> tuple[Any, Any]:
+        v = v + h * self._acceleration(q, v)
+        return self._pinocchio.integrate(self._model, q, h * v), v
+
+    def run(self, repetitions: int) -> Result:
+        """The same."""
+        array, problem = self._numpy.array, self._problem
+        x, h = problem.state, problem.end / self._steps
+        turn = [*x[1:4], x[0]]
+        start_q = array([*x[7:10], *turn])
+        start_v = array([*seen_from(x[:4], x[10:13]), *x[4:7]] if problem.moves else x[4:7])
+
+        def integrate() -> tuple[Any, Any]:
+            q, v = start_q, start_v
+            for _ in range(self._steps):
+                q, v = self._step(q, v, h)
+            return q, v
+
+        watch = Watch()
+        for _ in range(repetitions):
+            q, v = (list(map(float, y)) for y in watch.time(integrate))
+        last = [q[-1], *q[-4:-1]]
+        state = [*last, *v[-3:]]
+        if problem.moves:
+            state += [*q[:3], *rotated(last, v[:3])]
+        return Result(watch, state, self._steps, self._evaluations * self._steps)
+
+
 MAKERS: Mapping[str, Callable[..., Any]] = {
     "compiled": Compiled,
     "heyoka": Heyoka,
     "scipy": SciPy,
     "mujoco": MuJoCo,
+    "bullet": Bullet,
+    "pinocchio": Pinocchio,
 }
 
 
