@@ -40,7 +40,7 @@ from hamotor.bench.problems import GOALS, TARGETS, Problem, own_problems, proble
 from hamotor.errors import HamotorError, ToolError
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.library import SceneLibrary
-from hamotor.run.simulation import Compiled, Simulation
+from hamotor.run.simulation import Compiled, Simulation, load
 from hamotor.scene import METHODS
 from hamotor.scene.scalars import COUNTED
 
@@ -209,7 +209,7 @@ def _long_runs(
         rows = conserved[run["problem"]].rows(said["states"])
         every, step = said["every"], run["step"]
         about = Drift(
-            run["problem"], run["name"], "peer", every * len(rows), step, "", 0.0, None, None,
+            run["problem"], run["name"], run["family"], every * len(rows), step, "", 0.0, None, None,
             said.get("seconds", 0.0), failure=said["failure"],
         )  # fmt: skip
         found += drifts(about, conserved[run["problem"]], every, Fraction(every * step), rows)
@@ -428,7 +428,8 @@ def _set_up(one: Problem, extent: Extent) -> dict[str, float]:
         tempfile.TemporaryDirectory() as folder,
         environment(HAMOTOR_CACHE=folder, CXX=compiler),
     ):
-        built = one.simulation.compile(method=method)
+        fresh = load(one.text) if one.text else one.simulation  # which remembers no text
+        built = fresh.compile(method=method)
         end = one.simulation.end
         began = time.perf_counter()
         with built.library.start(method, step=end * 2.0**-20, state=one.simulation.state) as live:

@@ -208,6 +208,7 @@ def long_runs(
         {
             "problem": c.problem,
             "name": c.name,
+            "family": c.family,
             "kind": c.kind,
             "options": c.said["options"],
             "step": steps_of[c.problem],
