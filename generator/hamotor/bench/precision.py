@@ -209,9 +209,18 @@ def _long_runs(
         rows = conserved[run["problem"]].rows(said["states"])
         every, step = said["every"], run["step"]
         about = Drift(
-            run["problem"], run["name"], run["family"], every * len(rows), step, "", 0.0, None, None,
-            said.get("seconds", 0.0), failure=said["failure"],
-        )  # fmt: skip
+            problem=run["problem"],
+            contestant=run["name"],
+            family=run["family"],
+            steps=every * len(rows),
+            step=step,
+            quantity="",
+            largest=0.0,
+            exponent=None,
+            exponent_error=None,
+            seconds=said.get("seconds", 0.0),
+            failure=said["failure"],
+        )
         found += drifts(about, conserved[run["problem"]], every, Fraction(every * step), rows)
     return found
 
