@@ -5,83 +5,227 @@
 // member's numbers do not depend on the others, on the threads or on the lanes.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <new>
+#include <exception>
+#include <memory>
+#include <span>
 #include <string>
+#include <string_view>
+#include <tuple>
+#include <type_traits>
 #include <vector>
 
+#include "hamotor/ensemble.hpp"
+#include "hamotor/pack.hpp"
 #include "hamotor/scene_abi.hpp"
 
 namespace hamotor::scene {
 
-/// Members of a scene under way, all with one method, time and step.
-template <class Scene>
-class Ensemble {
+/// Members of a scene under way, whatever steps them.
+class AnyEnsemble {
  public:
-  /// `states` has a row of `Run`'s state for each member.
-  Ensemble(const typename MethodsOf<Scene>::AnyOf& method, double time, double step,
-           std::int64_t members, const double* states) {
-    runs_.reserve(static_cast<std::size_t>(members));
-    for (std::int64_t i = 0; i < members; ++i) {
-      runs_.emplace_back(method, time, step, states + static_cast<std::size_t>(i) * row);
-    }
-    steps_.assign(runs_.size(), 0);
-  }
+  AnyEnsemble() = default;
+  AnyEnsemble(const AnyEnsemble&) = delete;
+  AnyEnsemble& operator=(const AnyEnsemble&) = delete;
+  virtual ~AnyEnsemble() = default;
 
-  /// Every member that is alive takes so many steps; how many still are.
-  [[nodiscard]] std::int64_t advance(std::int64_t steps) noexcept {
-    std::int64_t alive = 0;
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-      const auto done = runs_[i].advance(steps, 0, nullptr);
-      steps_[i] += done;
-      alive += done == steps ? 1 : 0;
-    }
-    return alive;
-  }
+  [[nodiscard]] virtual std::int64_t advance(std::int64_t steps) = 0;
+  virtual void observe(std::int64_t first, std::int64_t count, double* rows) const = 0;
+  virtual void read_states(double* states) const = 0;
+  virtual void failures(std::int32_t* failure, std::int64_t* step) const = 0;
+};
 
-  void observe(std::int64_t first, std::int64_t count, double* rows) const noexcept {
-    for (std::int64_t i = first; i < first + count; ++i, rows += columns<Scene>()) {
-      runs_[static_cast<std::size_t>(i)].observe(rows);
+/// A system on a group whose exponential is one formula, without cases.
+template <class System>
+concept SystemInSpace = requires { Space<typename System::Group>::dimension; };
+
+/// The methods that step all lanes of a pack at once: those with nothing to wait for.  The others
+/// choose their own steps or iterate until they have converged.
+template <class System>
+struct PackSteppers {
+  using type = std::tuple<Rk4<System>>;
+};
+template <SystemInSpace System>
+struct PackSteppers<System> {
+  using type = std::tuple<Rk4<System>, Rkmk4<System>, CommutatorFree4<System>>;
+};
+template <SystemInSpace System>
+  requires SplitSystem<System>
+struct PackSteppers<System> {
+  using type =
+      std::tuple<Rk4<System>, Rkmk4<System>, CommutatorFree4<System>, Splitting2<System>,
+                 Splitting4<System>, Splitting6<System>, Splitting8<System>, Splitting10<System>>;
+};
+
+template <class Methods>
+inline constexpr auto names_of = std::tuple<>{};
+template <class... Method>
+inline constexpr std::array<std::string_view, sizeof...(Method)> names_of<std::tuple<Method...>>{
+    Method::name...};
+
+/// Whether a scene can be had in packs.
+template <class Scene>
+inline constexpr bool packs = false;
+template <class Scene>
+  requires requires { typename Scene::template In<Pack<typename Scene::Scalar, 1>>; }
+inline constexpr bool packs<Scene> =
+    Scene::kernels == "generated" && !requires { SystemOf<Scene>::iterates; };
+
+/// Whether there are ensembles of a scene: not where members' events would be passed over, nor of
+/// scenes that bring their own kind of run.
+template <class Scene>
+inline constexpr bool has_ensembles = !EventfulScene<Scene> && !requires { typename Scene::Run; };
+
+/// Members of a scene, stepped in scalars `S` by `Method`.
+template <class Scene, class S, class Method>
+class EnsembleOf final : public AnyEnsemble {
+  using Moment = scene::Moment<Scene>;
+  using System = SystemOf<Scene>;
+  using Stepped = decltype([] {
+    if constexpr (is_pack<S>) {
+      return std::type_identity<SystemOf<typename Scene::template In<S>>>{};
+    } else {
+      return std::type_identity<System>{};
+    }
+  }());
+  using Members = hamotor::Ensemble<typename Stepped::type, Method>;
+
+ public:
+  EnsembleOf(const Method& method, double time, double step,
+             std::span<const typename Members::Member> members, unsigned threads)
+      : members_(system(), method, static_cast<typename Members::Number>(time),
+                 static_cast<typename Members::Number>(step), members, threads) {}
+
+  [[nodiscard]] std::int64_t advance(std::int64_t steps) override {
+    return static_cast<std::int64_t>(members_.advance(steps));
+  }
+  void observe(std::int64_t first, std::int64_t count, double* rows) const override {
+    for (std::int64_t k = 0; k < count; ++k, rows += columns<Scene>()) {
+      moment(static_cast<std::size_t>(first + k)).write_row(Scene::system, rows);
     }
   }
-
-  void read_states(double* states) const noexcept {
-    for (const auto& run : runs_) {
-      run.read_state(states);
-      states += row;
+  void read_states(double* states) const override {
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      moment(k).write_state(states);
+      states += Scene::bodies.size() * body_size<Scene>;
     }
   }
-
-  void failures(std::int32_t* failure, std::int64_t* step) const noexcept {
-    for (std::size_t i = 0; i < runs_.size(); ++i) {
-      std::int64_t component = 0;
-      failure[i] = static_cast<std::int32_t>(runs_[i].failure(component));
-      step[i] = steps_[i];
+  void failures(std::int32_t* failure, std::int64_t* step) const override {
+    for (std::size_t k = 0; k < members_.size(); ++k) {
+      failure[k] = static_cast<std::int32_t>(members_.failure(k));
+      step[k] = members_.steps(k);
     }
   }
 
  private:
-  static constexpr std::size_t row = Scene::bodies.size() * body_size<Scene>;
+  [[nodiscard]] static const auto& system() noexcept {
+    if constexpr (is_pack<S>) {
+      return Scene::template In<S>::system;
+    } else {
+      return Scene::system;
+    }
+  }
 
-  std::vector<RunOf<Scene>> runs_;
-  std::vector<std::int64_t> steps_;
+  [[nodiscard]] Moment moment(std::size_t member) const noexcept {
+    Moment now{members_.time(member), members_.state(member), {}};
+    if constexpr (PoweredSystem<System>) now.work = members_.work(member);
+    return now;
+  }
+
+  Members members_;
+};
+
+/// Starts members by the method of this name, if it is among these; S is what they are stepped in.
+template <class Scene, class S, class Methods>
+struct EnsembleStart;
+template <class Scene, class S, class... Method>
+struct EnsembleStart<Scene, S, std::tuple<Method...>> {
+  using Member = StateOf<SystemOf<Scene>>;
+
+  [[nodiscard]] static std::unique_ptr<AnyEnsemble> by(std::string_view name, double time,
+                                                       double step, double tolerance,
+                                                       std::span<const Member> members,
+                                                       unsigned threads) {
+    std::unique_ptr<AnyEnsemble> result;
+    const auto consider = [&]<class One>(std::type_identity<One>) {
+      if constexpr (is_compiled<One>) {
+        if (name != One::name) return;
+        One method;
+        if constexpr (ErrorControlled<One, typename Scene::Scalar>) {
+          if (tolerance > 0) method.set_tolerance(typename Scene::Scalar(tolerance));
+        }
+        result = std::make_unique<EnsembleOf<Scene, S, One>>(method, time, step, members, threads);
+      }
+    };
+    (consider(std::type_identity<Method>{}), ...);
+    return result;
+  }
+};
+
+/// The methods of a tuple whose names are not among these.
+template <class Methods, class Packed>
+struct Others;
+template <class... Method, class Packed>
+struct Others<std::tuple<Method...>, Packed> {
+  template <class One>
+  static constexpr bool is_other = std::find(names_of<Packed>.begin(), names_of<Packed>.end(),
+                                             One::name) == names_of<Packed>.end();
+  using type = decltype(std::tuple_cat(
+      std::conditional_t<is_other<Method>, std::tuple<Method>, std::tuple<>>{}...));
 };
 
 /// `hamotor_ensemble_start`: NULL for a method that is unknown or not compiled, for lanes that
-/// there are not, or without memory.
+/// there are not, for a scene of which there are no ensembles, or without memory.
 template <class Scene>
 [[nodiscard]] void* start_ensemble(const char* method, double time, double step, double tolerance,
-                                   std::int64_t members, const double* states,
-                                   const double* /*parameters*/, std::int32_t /*threads*/,
+                                   std::int64_t count, const double* states,
+                                   const double* /*parameters*/, std::int32_t threads,
                                    std::int32_t lanes) noexcept {
-  typename MethodsOf<Scene>::AnyOf chosen;
-  if (method == nullptr || !MethodsOf<Scene>::choose(method, chosen)) return nullptr;
-  if (members < 0 || lanes < 0 || lanes > 1) return nullptr;
-  MethodsOf<Scene>::set_tolerance(tolerance, chosen);
-  try {
-    return new Ensemble<Scene>(chosen, time, step, members, states);
-  } catch (const std::bad_alloc&) {
+  if constexpr (has_ensembles<Scene>) {
+    using S = typename Scene::Scalar;
+    using System = SystemOf<Scene>;
+    if (method == nullptr || count < 1 || threads < 0) return nullptr;
+    try {
+      std::vector<StateOf<System>> members;
+      members.reserve(static_cast<std::size_t>(count));
+      for (std::int64_t k = 0; k < count; ++k) {
+        members.push_back(Moment<Scene>::from_user(states));
+        states += Scene::bodies.size() * body_size<Scene>;
+      }
+      std::unique_ptr<AnyEnsemble> started;
+      const auto start = [&]<class Lanes, class Methods>(std::type_identity<Lanes>,
+                                                         std::type_identity<Methods>) {
+        if (started) return;
+        started = EnsembleStart<Scene, Lanes, Methods>::by(method, time, step, tolerance, members,
+                                                           static_cast<unsigned>(threads));
+      };
+      if constexpr (packs<Scene>) {
+        using Wide = Pack<S, widest<S>>;
+        using One = Pack<S, 1>;
+        using WideSystem = SystemOf<typename Scene::template In<Wide>>;
+        using OneSystem = SystemOf<typename Scene::template In<One>>;
+        using Packed = typename PackSteppers<WideSystem>::type;
+        if (lanes == 0 || lanes == static_cast<std::int32_t>(widest<S>)) {
+          start(std::type_identity<Wide>{}, std::type_identity<Packed>{});
+        } else if (lanes == 1) {
+          start(std::type_identity<One>{},
+                std::type_identity<typename PackSteppers<OneSystem>::type>{});
+        }
+        if (lanes <= 1) {
+          start(std::type_identity<S>{},
+                std::type_identity<typename Others<SteppersOf<System>, Packed>::type>{});
+        }
+      } else if (lanes == 0 || lanes == 1) {
+        start(std::type_identity<S>{}, std::type_identity<SteppersOf<System>>{});
+      }
+      return started.release();
+    } catch (const std::exception&) {
+      return nullptr;
+    }
+  } else {
     return nullptr;
   }
 }
@@ -89,7 +233,14 @@ template <class Scene>
 /// What `hamotor_describe` says of ensembles.
 template <class Scene>
 [[nodiscard]] std::string ensemble_json() {
-  return R"({"lanes": 1, "isa": "scalar", "parameters": []})";
+  if constexpr (!has_ensembles<Scene>) {
+    return "null";
+  } else if constexpr (packs<Scene>) {
+    return "{\"lanes\": " + std::to_string(widest<typename Scene::Scalar>) +
+           ", \"isa\": " + json_string(instruction_set) + ", \"parameters\": []}";
+  } else {
+    return R"({"lanes": 1, "isa": "scalar", "parameters": []})";
+  }
 }
 
 }  // namespace hamotor::scene
@@ -102,20 +253,20 @@ template <class Scene>
                                                  parameters, threads, lanes);                      \
   }                                                                                                \
   HAMOTOR_SCENE_EXPORT std::int64_t hamotor_ensemble_advance(void* ensemble, std::int64_t steps) { \
-    return static_cast<hamotor::scene::Ensemble<Scene>*>(ensemble)->advance(steps);                \
+    return static_cast<hamotor::scene::AnyEnsemble*>(ensemble)->advance(steps);                    \
   }                                                                                                \
   HAMOTOR_SCENE_EXPORT void hamotor_ensemble_observe(const void* ensemble, std::int64_t first,     \
                                                      std::int64_t count, double* rows) {           \
-    static_cast<const hamotor::scene::Ensemble<Scene>*>(ensemble)->observe(first, count, rows);    \
+    static_cast<const hamotor::scene::AnyEnsemble*>(ensemble)->observe(first, count, rows);        \
   }                                                                                                \
   HAMOTOR_SCENE_EXPORT void hamotor_ensemble_states(const void* ensemble, double* states) {        \
-    static_cast<const hamotor::scene::Ensemble<Scene>*>(ensemble)->read_states(states);            \
+    static_cast<const hamotor::scene::AnyEnsemble*>(ensemble)->read_states(states);                \
   }                                                                                                \
   HAMOTOR_SCENE_EXPORT void hamotor_ensemble_failures(const void* ensemble, std::int32_t* failure, \
                                                       std::int64_t* step) {                        \
-    static_cast<const hamotor::scene::Ensemble<Scene>*>(ensemble)->failures(failure, step);        \
+    static_cast<const hamotor::scene::AnyEnsemble*>(ensemble)->failures(failure, step);            \
   }                                                                                                \
   HAMOTOR_SCENE_EXPORT void hamotor_ensemble_stop(void* ensemble) {                                \
-    delete static_cast<hamotor::scene::Ensemble<Scene>*>(ensemble);                                \
+    delete static_cast<hamotor::scene::AnyEnsemble*>(ensemble);                                    \
   }                                                                                                \
-  static_assert(sizeof(hamotor::scene::Ensemble<Scene>) > 0)
+  static_assert(sizeof(hamotor::scene::AnyEnsemble) > 0)

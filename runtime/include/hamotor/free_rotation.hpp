@@ -5,9 +5,9 @@
 #pragma once
 
 #include <array>
-#include <concepts>
 #include <cstddef>
 
+#include "hamotor/angle_increment.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/space.hpp"
 #include "hamotor/splitting_schemes.hpp"
@@ -87,97 +87,6 @@ template <class S, std::size_t R, std::size_t D, std::size_t points>
   }
   return split;
 }
-
-namespace detail {
-
-/// (sin x)/x − 1 over z, and (cos x − 1)/z, z = x² ≤ (π/4)²: minimax polynomials, relative errors
-/// of sin x and cos x − 1 below 2.1e-17 before rounding.  Sums in pairs, so that few wait for each
-/// other.
-template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr S sine_series(const S& z) noexcept {
-  const S z2 = z * z;
-  const S a = mul_add(S(0x1.1111111110babp-7), z, S(-0x1.5555555555555p-3));
-  const S b = mul_add(S(0x1.71de37946ed6dp-19), z, S(-0x1.a01a019e820aep-13));
-  const S c = mul_add(S(0x1.5e0a4fc16be59p-33), z, S(-0x1.ae6008d114485p-26));
-  return mul_add(z2 * z2, c, mul_add(z2, b, a));
-}
-template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr S cosine_series(const S& z) noexcept {
-  const S z2 = z * z;
-  const S a = mul_add(S(-0x1.6c16c16c16963p-10), z, S(0x1.5555555555555p-5));
-  const S b = mul_add(S(-0x1.27e4fa16cc2d1p-22), z, S(0x1.a01a019f4ddfdp-16));
-  const S c = mul_add(S(-0x1.907cd8ff5ede7p-37), z, S(0x1.1eeb67d026ec6p-29));
-  return mul_add(z, mul_add(z2 * z2, c, mul_add(z2, b, a)), S(-0.5));
-}
-
-/// Whether those polynomials have all digits of S.
-template <class S>
-inline constexpr bool has_series = std::same_as<S, double> || std::same_as<S, float>;
-
-/// (π/4)²
-template <class S>
-inline constexpr S series_bound = S(0x1.3bd3cc9be45dep-1);
-
-}  // namespace detail
-
-/// Sine of an angle and its cosine less one, both with all digits however small the angle.
-template <class S>
-struct AngleIncrement {
-  S sine;
-  S cosine_less_one;
-
-  [[nodiscard]] HAMOTOR_INLINE static constexpr AngleIncrement of(const S& angle) noexcept {
-    if constexpr (detail::has_series<S>) {
-      if (is_small(angle)) return of_small(angle);
-    }
-    return of_any(angle);
-  }
-
-  /// Whether the polynomials are for this angle.
-  [[nodiscard]] HAMOTOR_INLINE static constexpr bool is_small(const S& angle) noexcept {
-    return angle * angle <= detail::series_bound<S>;
-  }
-
-  [[nodiscard]] HAMOTOR_INLINE static constexpr AngleIncrement of_small(const S& angle) noexcept {
-    const S z = angle * angle;
-    return {mul_add(angle * z, detail::sine_series(z), angle), z * detail::cosine_series(z)};
-  }
-
-  /// Of twice the angle.
-  [[nodiscard]] HAMOTOR_INLINE constexpr AngleIncrement twice() const noexcept {
-    return {S(2) * mul_add(sine, cosine_less_one, sine), S(-2) * sine * sine};
-  }
-
- private:
-  [[nodiscard]] static constexpr AngleIncrement of_any(const S& angle) noexcept {
-    if constexpr (std::same_as<S, double> && has_fused_multiply_add) {
-      if (scalar::abs(angle) < S(1e8)) return reduced(angle);
-    }
-    const S sine = scalar::sin(S(0.5) * angle);
-    return {S(2) * sine * scalar::cos(S(0.5) * angle), S(-2) * sine * sine};
-  }
-
-  /// By the rest after quarter turns, π/2 in three words (Cody & Waite 1980).
-  [[nodiscard]] static constexpr AngleIncrement reduced(const S& angle) noexcept {
-    constexpr S to_integer = S(0x1.8p52);
-    const S shifted = mul_add(angle, S(0x1.45f306dc9c883p-1), to_integer);
-    const S quarters = shifted - to_integer;
-    const S rest = mul_add(-quarters, S(-0x1.f1976b7ed8fbcp-110),
-                           mul_add(-quarters, S(0x1.1a62633145c07p-54),
-                                   mul_add(-quarters, S(0x1.921fb54442d18p+0), angle)));
-    const auto [sine, cosine_less_one] = of_small(rest);
-    switch (static_cast<long long>(quarters) & 3) {
-      case 0:
-        return {sine, cosine_less_one};
-      case 1:
-        return {S(1) + cosine_less_one, -sine - S(1)};
-      case 2:
-        return {-sine, -cosine_less_one - S(2)};
-      default:
-        return {-S(1) - cosine_less_one, sine - S(1)};
-    }
-  }
-};
 
 namespace detail {
 
@@ -450,11 +359,28 @@ class PrincipalRotation {
   /// (sin x)/x and cos x − 1 from x²: no root and no quotient where x is small.
   [[nodiscard]] HAMOTOR_INLINE static constexpr HalfAbout half_about(const S& square) noexcept {
     if constexpr (detail::has_series<S>) {
-      if (square <= detail::series_bound<S>) {
-        return {mul_add(square, detail::sine_series(square), S(1)),
-                square * detail::cosine_series(square)};
-      }
+      const auto small = square <= detail::series_bound<S>;
+      if (all(small)) return by_series(square);
+      if constexpr (scalar::has_lanes<S>) return by_each(square);
     }
+    return by_angle(square);
+  }
+
+  /// What each lane's own size asks for.
+  [[nodiscard, gnu::cold, gnu::noinline]] static HalfAbout by_each(const S& square) noexcept {
+    const auto small = square <= detail::series_bound<S>;
+    const HalfAbout near = by_series(square);
+    const HalfAbout far = by_angle(square);
+    return {select(small, near.sine_ratio, far.sine_ratio),
+            select(small, near.cosine_less_one, far.cosine_less_one)};
+  }
+
+  [[nodiscard]] HAMOTOR_INLINE static constexpr HalfAbout by_series(const S& square) noexcept {
+    return {mul_add(square, detail::sine_series(square), S(1)),
+            square * detail::cosine_series(square)};
+  }
+
+  [[nodiscard]] static constexpr HalfAbout by_angle(const S& square) noexcept {
     const S x = scalar::sqrt(square);
     const auto half = AngleIncrement<S>::of(x);
     return {select(x > S(0), half.sine / x, S(1)), half.cosine_less_one};
@@ -467,10 +393,13 @@ class PrincipalRotation {
     const S x = half_per_momentum * pi[K];
     if constexpr (detail::has_series<S>) {
       // The next turn waits for this one's Π: not for the half angle as well, where it need not.
-      if (Increment::is_small(x + x)) {
-        detail::turn_about_axis<K>(Increment::of_small(x), Increment::of_small(x + x), start, pi,
-                                   change);
-        return;
+      // Packs do not wait, they count operations.
+      if constexpr (!scalar::has_lanes<S>) {
+        if (Increment::is_small(x + x)) {
+          detail::turn_about_axis<K>(Increment::of_small(x), Increment::of_small(x + x), start, pi,
+                                     change);
+          return;
+        }
       }
     }
     const auto half = Increment::of(x);

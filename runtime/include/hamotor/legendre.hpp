@@ -131,6 +131,8 @@ struct LegendreSystem {
   using S = Scalar;
   static constexpr std::size_t bodies = Lagrangian::bodies;
   static constexpr bool has_forque = Lagrangian::has_forque;
+  /// Every body of an ensemble converges in its own time.
+  static constexpr bool iterates = true;
   static constexpr auto dimension = static_cast<std::size_t>(Group::dimension);
   static constexpr std::size_t size = bodies * dimension;
   using State = hamotor::State<Group, bodies, S>;

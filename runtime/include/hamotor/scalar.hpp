@@ -59,6 +59,8 @@ namespace hamotor {
 /// has not (a software fma is ten times slower).  The only customisation point of the products.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S mul_add(const S& a, const S& b, const S& c) noexcept {
+  // A scalar's own, which it cannot bring as an overload: kernels call this one by its full name.
+  if constexpr (requires { S::multiply_add(a, b, c); }) return S::multiply_add(a, b, c);
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
 #if defined(__clang__)
   // clang does not evaluate the builtin at compile time; constants are rounded twice there.
@@ -141,6 +143,11 @@ template <class S>
   return condition ? a : b;
 }
 
+/// Whether a condition holds for all of a scalar's numbers, and for any: of a pack's lanes, or of
+/// the one number that other scalars are.
+[[nodiscard]] HAMOTOR_INLINE constexpr bool all(bool condition) noexcept { return condition; }
+[[nodiscard]] HAMOTOR_INLINE constexpr bool any(bool condition) noexcept { return condition; }
+
 /// Whether `mul_add` rounds once for double.
 #if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
 inline constexpr bool has_fused_multiply_add = true;
@@ -204,6 +211,24 @@ template <class S>
 /// std::numeric_limits, and those of __float128, which not every library gives.
 template <class S>
 struct Limits : std::numeric_limits<S> {};
+
+namespace detail {
+template <class S>
+struct Number {
+  using type = S;
+};
+template <class S>
+  requires requires { typename S::Number; }
+struct Number<S> {
+  using type = typename S::Number;
+};
+}  // namespace detail
+
+/// What a scalar holds one or several of: a pack's lanes, otherwise itself.
+template <class S>
+using NumberOf = typename detail::Number<S>::type;
+template <class S>
+inline constexpr bool has_lanes = !std::is_same_v<NumberOf<S>, S>;
 
 /// Whether squares of numbers and of their inverses overflow only where nothing is meant by them.
 template <class S>
@@ -363,6 +388,8 @@ template <class S>
     return __builtin_fabs(x);
   } else if constexpr (std::is_same_v<S, float>) {
     return __builtin_fabsf(x);
+  } else if constexpr (requires { S::magnitude(x); }) {
+    return S::magnitude(x);
   } else {
     return select(x < S(0), -x, x);
   }

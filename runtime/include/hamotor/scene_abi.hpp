@@ -103,6 +103,8 @@ concept SceneDefinition =
 
 namespace scene {
 
+using hamotor::is_finite;
+
 template <class Scene>
 using SystemOf = std::remove_cvref_t<decltype(Scene::system)>;
 
@@ -422,19 +424,6 @@ template <class Scene>
          ",\n \"events\": " + events_json<Scene>() + ensemble + "}\n";
 }
 
-/// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
-template <class G, std::size_t N, class S>
-[[nodiscard]] constexpr bool is_finite(const State<G, N, S>& state) noexcept {
-  S sum(0);
-  for (std::size_t i = 0; i < N; ++i) {
-    S part(0);
-    for (const S& x : state.motors[i].components()) part = mul_add(S(0), x, part);
-    for (const S& x : state.momenta[i].components()) sum = mul_add(S(0), x, sum);
-    sum = sum + part;
-  }
-  return sum == S(0);
-}
-
 /// Where the first number of a state that is not finite stands, −1 if there is none.
 template <class G, std::size_t N, class S>
 [[nodiscard]] constexpr std::int64_t first_not_finite(const State<G, N, S>& state) noexcept {
@@ -470,9 +459,10 @@ template <class Method>
   return said == Failure::none ? Failure::not_finite : said;
 }
 
-/// A scene under way.
-template <SceneDefinition Scene>
-class Run {
+/// A scene's system at a moment, with its rows: of the system that is compiled, or of one with
+/// other parameters.
+template <class Scene>
+struct Moment {
   using System = SystemOf<Scene>;
   using S = typename Scene::Scalar;
   using G = typename Scene::Group;
@@ -480,19 +470,149 @@ class Run {
   using Momentum = typename G::template Momentum<S>;
   static constexpr std::size_t n = System::bodies;
 
+  S time;
+  StateOf<System> state;
+  S work;
+
+  /// The state in principal frames of one in the user's.
+  template <class Number>
+  [[nodiscard]] static StateOf<System> from_user(const Number* numbers) noexcept {
+    StateOf<System> result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Motor motor = Motor::from(read<motor_size<Scene>>(numbers));
+      const Momentum momentum = Momentum::from(read<momentum_size<Scene>>(numbers));
+      result.motors[i] = gp(motor, Scene::frames[i]);
+      result.momenta[i] = Ad_star(Scene::frames[i], momentum);
+    }
+    return result;
+  }
+
+  /// The state in the user's body frames.
+  void write_state(double* to) const noexcept {
+    for (std::size_t i = 0; i < n; ++i) {
+      to = write(user_motor(i).components(), to);
+      to = write(user_momentum(i).components(), to);
+    }
+  }
+
+  /// One row of columns.
+  template <class Number>
+  void write_row(const System& system, Number* row) const noexcept {
+    *row++ = static_cast<Number>(time);
+    std::array<Momentum, n> spatial{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Motor motor = user_motor(i);
+      row = write(motor.components(), row);
+      row = write(user_momentum(i).components(), row);
+      row = write(place(system, i, motor), row);
+      spatial[i] = Ad_star_inverse(state.motors[i], state.momenta[i]);
+    }
+    for (std::size_t i = 1; i < n; ++i) spatial[0] = spatial[0] + spatial[i];
+    const auto total = spatial[0].components();
+    const S h = energy(system, state, time);
+    *row++ = static_cast<Number>(h);
+    if constexpr (PoweredSystem<System>) *row++ = static_cast<Number>(work);
+    row = write(total, row);
+    for (const auto& conserved : Scene::conserved) {
+      if (!has_own_column(conserved)) continue;
+      *row++ = static_cast<Number>(value_of(conserved, h, total));
+    }
+  }
+
+ private:
+  [[nodiscard]] Motor user_motor(std::size_t i) const noexcept {
+    return gp(state.motors[i], reverse(Scene::frames[i]));
+  }
+
+  [[nodiscard]] Momentum user_momentum(std::size_t i) const noexcept {
+    return Ad_star_inverse(Scene::frames[i], state.momenta[i]);
+  }
+
+  [[nodiscard]] static auto place([[maybe_unused]] const System& system,
+                                  [[maybe_unused]] std::size_t i, const Motor& motor) noexcept {
+    if constexpr (PlacedScene<Scene>) {
+      return Scene::place(i, motor);
+    } else if constexpr (Space<G>::translates) {
+      return sandwich(motor, typename Space<G>::template Origin<S>{}).components();
+    } else {
+      std::array<S, place_size<Scene>()> where{};
+      system.for_each_body([&](auto k, const auto& body) {
+        if (k == i) where = body.fixed_point();
+      });
+      return where;
+    }
+  }
+
+  [[nodiscard]] static S combination(const std::array<double, momentum_size<Scene>>& coefficients,
+                                     const std::array<S, momentum_size<Scene>>& total) noexcept {
+    S sum(0);
+    for (std::size_t k = 0; k < total.size(); ++k) {
+      if (coefficients[k] != 0) sum = mul_add(S(coefficients[k]), total[k], sum);
+    }
+    return sum;
+  }
+
+  [[nodiscard]] S value_of(const Conserved<G>& conserved, const S& h,
+                           const std::array<S, momentum_size<Scene>>& total) const noexcept {
+    if (conserved.quantity == Quantity::spatial_momentum) {
+      return combination(conserved.coefficients, total);
+    }
+    if constexpr (PoweredSystem<System>) {
+      if (conserved.quantity == Quantity::energy_balance) return h - work;
+    }
+    if constexpr (requires { Scene::quantities(state, time); }) {
+      return Scene::quantities(state, time)[conserved.index];
+    } else if constexpr (PlacedScene<Scene>) {
+      return S(std::numeric_limits<double>::quiet_NaN());
+    } else {
+      return casimir(conserved.quantity, conserved.body);
+    }
+  }
+
+  [[nodiscard]] S casimir(Quantity quantity, std::size_t i) const noexcept {
+    constexpr std::size_t rotations = Space<G>::rotations;
+    const auto mu = state.momenta[i].components();
+    const auto pi = detail::first<rotations>(mu);
+    if (quantity == Quantity::pi_squared) return detail::dot(pi, pi);
+    if constexpr (Space<G>::translates) {
+      const auto p = detail::rest<rotations>(mu);
+      if (quantity == Quantity::p_squared) return detail::dot(p, p);
+      if constexpr (rotations == 3) {
+        if (quantity == Quantity::p_dot_pi) return detail::dot(p, pi);
+      }
+    }
+    return S(std::numeric_limits<double>::quiet_NaN());
+  }
+
+  template <std::size_t size, class Number>
+  [[nodiscard]] static std::array<S, size> read(const Number*& from) noexcept {
+    std::array<S, size> result{};
+    for (S& x : result) x = static_cast<S>(*from++);
+    return result;
+  }
+
+  template <class Number, std::size_t size>
+  [[nodiscard]] static Number* write(const std::array<S, size>& values, Number* to) noexcept {
+    for (const S& x : values) *to++ = static_cast<Number>(x);
+    return to;
+  }
+};
+
+/// A scene under way.
+template <SceneDefinition Scene>
+class Run {
+  using System = SystemOf<Scene>;
+  using S = typename Scene::Scalar;
+  using G = typename Scene::Group;
+  using Moment = scene::Moment<Scene>;
+  static constexpr std::size_t n = System::bodies;
+
  public:
   /// Starts from `state`, user's body frames; `Number` is double or the scene's scalar.
   template <class Number>
   Run(const typename MethodsOf<Scene>::AnyOf& method, const std::type_identity_t<Number>& time,
       const std::type_identity_t<Number>& step, const Number* state) noexcept
-      : method_(method), time_(S(time)), step_(S(step)) {
-    for (std::size_t i = 0; i < n; ++i) {
-      const Motor motor = Motor::from(read<motor_size<Scene>>(state));
-      const Momentum momentum = Momentum::from(read<momentum_size<Scene>>(state));
-      state_.motors[i] = gp(motor, Scene::frames[i]);
-      state_.momenta[i] = Ad_star(Scene::frames[i], momentum);
-    }
-  }
+      : method_(method), time_(S(time)), step_(S(step)), state_(Moment::from_user(state)) {}
 
   /// Up to `steps` steps; a row after each whose index is a multiple of `every`.  Returns the steps
   /// done: fewer mean that an event happened in the last of them, or that the next one failed; the
@@ -506,25 +626,7 @@ class Run {
   /// One row of columns.
   template <class Number>
   void observe(Number* row) const noexcept {
-    *row++ = static_cast<Number>(now());
-    std::array<Momentum, n> spatial{};
-    for (std::size_t i = 0; i < n; ++i) {
-      const Motor motor = user_motor(i);
-      row = write(motor.components(), row);
-      row = write(user_momentum(i).components(), row);
-      row = write(place(i, motor), row);
-      spatial[i] = Ad_star_inverse(state_.motors[i], state_.momenta[i]);
-    }
-    for (std::size_t i = 1; i < n; ++i) spatial[0] = spatial[0] + spatial[i];
-    const auto total = spatial[0].components();
-    const S h = energy(Scene::system, state_, now());
-    *row++ = static_cast<Number>(h);
-    if constexpr (PoweredSystem<System>) *row++ = static_cast<Number>(work_);
-    row = write(total, row);
-    for (const auto& conserved : Scene::conserved) {
-      if (!has_own_column(conserved)) continue;
-      *row++ = static_cast<Number>(value_of(conserved, h, total));
-    }
+    moment().write_row(Scene::system, row);
   }
 
   /// One row of columns at a time that is not the end of a step, by a part of a step from the
@@ -555,12 +657,7 @@ class Run {
   }
 
   /// The state in the user's body frames.
-  void read_state(double* state) const noexcept {
-    for (std::size_t i = 0; i < n; ++i) {
-      state = write(user_motor(i).components(), state);
-      state = write(user_momentum(i).components(), state);
-    }
-  }
+  void read_state(double* state) const noexcept { moment().write_state(state); }
 
   [[nodiscard]] const Drift<S>& drift() const noexcept { return drift_; }
 
@@ -608,13 +705,6 @@ class Run {
     }
     return steps;
   }
-
-  /// A state with its time, and the work done until then.
-  struct Moment {
-    S time;
-    StateOf<System> state;
-    S work;
-  };
 
   void stand_at(const Moment& moment) noexcept {
     time_ = moment.time;
@@ -677,81 +767,7 @@ class Run {
 
   [[nodiscard]] S now() const noexcept { return mul_add(static_cast<S>(index_), step_, time_); }
 
-  [[nodiscard]] Motor user_motor(std::size_t i) const noexcept {
-    return gp(state_.motors[i], reverse(Scene::frames[i]));
-  }
-
-  [[nodiscard]] Momentum user_momentum(std::size_t i) const noexcept {
-    return Ad_star_inverse(Scene::frames[i], state_.momenta[i]);
-  }
-
-  [[nodiscard]] static auto place([[maybe_unused]] std::size_t i, const Motor& motor) noexcept {
-    if constexpr (PlacedScene<Scene>) {
-      return Scene::place(i, motor);
-    } else if constexpr (Space<G>::translates) {
-      return sandwich(motor, typename Space<G>::template Origin<S>{}).components();
-    } else {
-      std::array<S, place_size<Scene>()> where{};
-      Scene::system.for_each_body([&](auto k, const auto& body) {
-        if (k == i) where = body.fixed_point();
-      });
-      return where;
-    }
-  }
-
-  [[nodiscard]] static S combination(const std::array<double, momentum_size<Scene>>& coefficients,
-                                     const std::array<S, momentum_size<Scene>>& total) noexcept {
-    S sum(0);
-    for (std::size_t k = 0; k < total.size(); ++k) {
-      if (coefficients[k] != 0) sum = mul_add(S(coefficients[k]), total[k], sum);
-    }
-    return sum;
-  }
-
-  [[nodiscard]] S value_of(const Conserved<G>& conserved, const S& h,
-                           const std::array<S, momentum_size<Scene>>& total) const noexcept {
-    if (conserved.quantity == Quantity::spatial_momentum) {
-      return combination(conserved.coefficients, total);
-    }
-    if constexpr (PoweredSystem<System>) {
-      if (conserved.quantity == Quantity::energy_balance) return h - work_;
-    }
-    if constexpr (requires { Scene::quantities(state_, time_); }) {
-      return Scene::quantities(state_, now())[conserved.index];
-    } else if constexpr (PlacedScene<Scene>) {
-      return S(std::numeric_limits<double>::quiet_NaN());
-    } else {
-      return casimir(conserved.quantity, conserved.body);
-    }
-  }
-
-  [[nodiscard]] S casimir(Quantity quantity, std::size_t i) const noexcept {
-    constexpr std::size_t rotations = Space<G>::rotations;
-    const auto mu = state_.momenta[i].components();
-    const auto pi = detail::first<rotations>(mu);
-    if (quantity == Quantity::pi_squared) return detail::dot(pi, pi);
-    if constexpr (Space<G>::translates) {
-      const auto p = detail::rest<rotations>(mu);
-      if (quantity == Quantity::p_squared) return detail::dot(p, p);
-      if constexpr (rotations == 3) {
-        if (quantity == Quantity::p_dot_pi) return detail::dot(p, pi);
-      }
-    }
-    return S(std::numeric_limits<double>::quiet_NaN());
-  }
-
-  template <std::size_t size, class Number>
-  [[nodiscard]] static std::array<S, size> read(const Number*& from) noexcept {
-    std::array<S, size> result{};
-    for (S& x : result) x = static_cast<S>(*from++);
-    return result;
-  }
-
-  template <class Number, std::size_t size>
-  [[nodiscard]] static Number* write(const std::array<S, size>& values, Number* to) noexcept {
-    for (const S& x : values) *to++ = static_cast<Number>(x);
-    return to;
-  }
+  [[nodiscard]] Moment moment() const noexcept { return {now(), state_, work_}; }
 
   typename MethodsOf<Scene>::AnyOf method_;
   S time_;

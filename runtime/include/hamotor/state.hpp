@@ -32,6 +32,19 @@ struct State {
   [[nodiscard]] friend constexpr bool operator==(const State&, const State&) = default;
 };
 
+/// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
+template <class G, std::size_t N, class S>
+[[nodiscard]] constexpr auto is_finite(const State<G, N, S>& state) noexcept {
+  S sum(0);
+  for (std::size_t i = 0; i < N; ++i) {
+    S part(0);
+    for (const S& x : state.motors[i].components()) part = mul_add(S(0), x, part);
+    for (const S& x : state.momenta[i].components()) sum = mul_add(S(0), x, sum);
+    sum = sum + part;
+  }
+  return sum == S(0);
+}
+
 /// A group of rotors with the generated kernels that mechanics on it needs, in the scalar S.
 template <class G, class S = double>
 concept LieGroup =

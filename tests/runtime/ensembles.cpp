@@ -1,0 +1,235 @@
+// Ensembles: a member's bits are its own, whatever the lanes, the threads and the other members do.
+#include "hamotor/ensemble.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <span>
+#include <tuple>
+#include <vector>
+
+#include "hamotor/pack.hpp"
+#include "hamotor/rkmk.hpp"
+#include "hamotor/steppers.hpp"
+#include "sample_systems.hpp"
+
+namespace {
+
+using hamotor::Ensemble;
+using hamotor::Failure;
+using hamotor::Pack;
+
+/// What numbers' bits are, all together (FNV-1a).
+class Hash {
+ public:
+  template <class State>
+  void add(const State& state) {
+    for (std::size_t i = 0; i < State::bodies; ++i) {
+      for (const double x : state.motors[i].components()) add(x);
+      for (const double x : state.momenta[i].components()) add(x);
+    }
+  }
+  void add(double x) {
+    std::uint64_t bits = 0;
+    std::memcpy(&bits, &x, sizeof bits);
+    value_ = (value_ ^ bits) * 0x100000001b3U;
+  }
+  [[nodiscard]] std::uint64_t value() const { return value_; }
+
+ private:
+  std::uint64_t value_ = 0xcbf29ce484222325U;
+};
+
+template <class System>
+using MemberOf = hamotor::State<typename System::Group, System::bodies, double>;
+
+/// Members of which some turn slowly; with `fast` some so that an angle of a step is many turns.
+template <class System>
+std::vector<MemberOf<System>> members_of(const System& system, std::size_t count, double fast = 0) {
+  std::vector<MemberOf<System>> members(count, sample::generic_state(system));
+  for (std::size_t k = 0; k < count; ++k) {
+    for (auto& momentum : members[k].momenta) {
+      auto x = momentum.components();
+      for (double& c : x) c *= 1 + 0.1 * static_cast<double>(k) + (k % 7 == 3 ? fast : 0);
+      momentum = std::remove_cvref_t<decltype(momentum)>::from(x);
+    }
+  }
+  return members;
+}
+
+constexpr std::size_t count = 41;
+constexpr int steps = 70;
+constexpr double step = 0.02;
+
+/// All members' bits after the steps, `parts` ensembles one after the other.
+template <template <class> class Method, class System>
+std::uint64_t hash_in(const System& system, const std::vector<MemberOf<System>>& members,
+                      unsigned threads, std::size_t parts) {
+  Hash hash;
+  for (std::size_t part = 0; part < parts; ++part) {
+    const std::size_t first = members.size() * part / parts;
+    const std::size_t last = members.size() * (part + 1) / parts;
+    Ensemble ensemble(system, Method<System>{}, 0.0, step,
+                      std::span(members).subspan(first, last - first), threads);
+    ensemble.advance(steps / 2);
+    ensemble.advance(steps - steps / 2);
+    for (std::size_t k = 0; k < ensemble.size(); ++k) hash.add(ensemble.state(k));
+  }
+  return hash.value();
+}
+
+template <class System>
+using Splitting2 = hamotor::Splitting2<System>;
+
+TEST(Ensembles, members_have_the_same_bits_in_any_lane_part_and_thread) {
+  const auto members = members_of(sample::forced_so3(), count);
+  const auto alone =
+      hash_in<hamotor::Rk4>(sample::forced_so3<Pack<double, 1>>(), members, 1, count);
+  const auto two = sample::forced_so3<Pack<double, 2>>();
+  const auto four = sample::forced_so3<Pack<double, 4>>();
+  const auto eight = sample::forced_so3<Pack<double, 8>>();
+  EXPECT_EQ(hash_in<hamotor::Rk4>(two, members, 1, 1), alone);
+  EXPECT_EQ(hash_in<hamotor::Rk4>(four, members, 2, 1), alone);
+  EXPECT_EQ(hash_in<hamotor::Rk4>(eight, members, 1, 1), alone);
+  EXPECT_EQ(hash_in<hamotor::Rk4>(eight, members, 3, 2), alone);
+}
+
+TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
+  const auto members = members_of(sample::forced_so3(), count, 1e3);
+  const auto alone = hash_in<Splitting2>(sample::forced_so3<Pack<double, 1>>(), members, 1, 1);
+  EXPECT_EQ(hash_in<Splitting2>(sample::forced_so3<Pack<double, 4>>(), members, 2, 3), alone);
+  const auto plates = members_of(sample::forced_se2(), count, 1e3);
+  const auto plate = hash_in<hamotor::Rkmk4>(sample::forced_se2<Pack<double, 1>>(), plates, 1, 1);
+  EXPECT_EQ(hash_in<hamotor::Rkmk4>(sample::forced_se2<Pack<double, 8>>(), plates, 2, 2), plate);
+}
+
+TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
+  const auto system = sample::forced_so3();
+  const auto members = members_of(system, 5);
+  const auto packs = sample::forced_so3<Pack<double, 8>>();
+  Ensemble ensemble(packs, hamotor::Rk4<decltype(packs)>{}, 0.5, step, std::span(members));
+  EXPECT_EQ(ensemble.advance(steps), 5U);
+  for (std::size_t k = 0; k < 5; ++k) {
+    auto state = members[k];
+    hamotor::Rk4<std::remove_cvref_t<decltype(system)>> method;
+    for (int n = 0; n < steps; ++n) method.do_step(system, state, 0.0, step);
+    EXPECT_EQ(ensemble.state(k), state);
+  }
+  EXPECT_EQ(ensemble.time(4), std::fma(double(steps), step, 0.5));
+}
+
+TEST(Ensembles, a_member_that_fails_keeps_its_last_state_and_the_others_go_on) {
+  const auto system = sample::forced_so3<Pack<double, 8>>();
+  auto members = members_of(sample::forced_so3(), count);
+  const auto unharmed = hash_in<hamotor::Rk4>(system, members, 1, 1);
+  const auto far = members[9];
+  members[9].momenta[0].l23 = 1e200;  // overflows in the first step
+  members[20].momenta[0].l12 = 4e5;   // leaves the group at once
+  members[31].momenta[0].l31 = std::numeric_limits<double>::quiet_NaN();
+  Ensemble ensemble(system, hamotor::Rk4<decltype(system)>{}, 0.0, step, std::span(members), 2);
+  EXPECT_EQ(ensemble.advance(steps), count - 3);
+  EXPECT_EQ(ensemble.failure(9), Failure::not_finite);
+  EXPECT_EQ(ensemble.failure(20), Failure::left_group);
+  EXPECT_EQ(ensemble.failure(31), Failure::not_finite);
+  EXPECT_EQ(ensemble.failure(30), Failure::none);
+  EXPECT_EQ(ensemble.steps(9), 0);
+  EXPECT_EQ(ensemble.steps(20), 0);
+  EXPECT_EQ(ensemble.steps(30), steps);
+  EXPECT_EQ(ensemble.state(9), members[9]);
+  EXPECT_EQ(ensemble.state(20), members[20]);
+
+  const auto untouched = members_of(sample::forced_so3(), count);
+  Ensemble fine(system, hamotor::Rk4<decltype(system)>{}, 0.0, step, std::span(untouched), 1);
+  fine.advance(steps);
+  Hash hash;
+  for (std::size_t k = 0; k < count; ++k) {
+    hash.add(fine.state(k));
+    if (k == 9 || k == 20 || k == 31) continue;
+    EXPECT_EQ(ensemble.state(k), fine.state(k));
+  }
+  EXPECT_EQ(hash.value(), unharmed);
+  EXPECT_EQ(far, untouched[9]);
+}
+
+TEST(Ensembles, the_example_of_the_documentation) {
+  using hamotor::pga3::SE3;
+  using Lanes = Pack<double, hamotor::widest<double>>;
+  constexpr std::array<double, 3> moments{1, 2, 3};
+  const hamotor::RigidBodies system{
+      std::tuple{hamotor::FreeBody<SE3, Lanes, hamotor::rotation_split(moments)>(1.5, {1, 2, 3})}};
+
+  std::vector<MemberOf<std::remove_cvref_t<decltype(system)>>> members(1000);
+  for (std::size_t k = 0; k < members.size(); ++k) {
+    members[k].motors[0] = SE3::Element<double>::identity();
+    members[k].momenta[0] = {0.001, 2 + 0.001 * static_cast<double>(k), 0, 1.5, 0, 0};
+  }
+  Ensemble ensemble(system, hamotor::Rk4<std::remove_cvref_t<decltype(system)>>{}, 0.0, 0.01,
+                    std::span(members));
+  EXPECT_EQ(ensemble.advance(100), 1000U);
+  EXPECT_NEAR(ensemble.state(999).momenta[0].l31, 2.999, 1e-5);
+}
+
+/// Largest error of a pack's function, in units of the last place, over angles of many sizes.
+template <class Function, class Exact>
+double ulps(const Function& function, const Exact& exact, double largest) {
+  double worst = 0;
+  double x = 1e-9;
+  for (int n = 0; x < largest; ++n) {
+    x *= 1.0007;
+    Pack<double, 4> four;
+    for (std::size_t k = 0; k < 4; ++k) four.set(k, (k % 2 == 0 ? x : -x) * (1 + 1e-4 * double(k)));
+    const auto found = function(four);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const long double truth = exact(static_cast<long double>(four[k]));
+      const int exponent = std::max(std::ilogb(static_cast<double>(truth)), -1022);
+      const double unit = std::ldexp(1.0, exponent - 52);
+      worst = std::max(worst, std::abs(static_cast<double>(found[k] - truth)) / unit);
+    }
+  }
+  return worst;
+}
+
+TEST(Packs, functions_have_all_digits) {
+  const auto sine = [](const auto& x) { return sin(x); };
+  const auto cosine = [](const auto& x) { return cos(x); };
+  const auto exponential = [](const auto& x) { return exp(x); };
+  EXPECT_LT(ulps(sine, [](long double x) { return std::sin(x); }, 1e12), 1.3);
+  EXPECT_LT(ulps(cosine, [](long double x) { return std::cos(x); }, 1e12), 1.3);
+  EXPECT_LT(ulps(exponential, [](long double x) { return std::exp(x); }, 745), 1.01);
+}
+
+TEST(Packs, functions_know_the_ends_of_the_numbers) {
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  Pack<double, 4> x(0);
+  const std::array<double, 4> ends{-infinity, infinity, -800, -745.1};
+  for (std::size_t k = 0; k < 4; ++k) x.set(k, ends[k]);
+  const auto e = exp(x);
+  EXPECT_EQ(e[0], 0);
+  EXPECT_EQ(e[1], infinity);
+  EXPECT_EQ(e[2], 0);
+  EXPECT_EQ(e[3], std::exp(-745.1));
+  x = Pack<double, 4>(std::numeric_limits<double>::quiet_NaN());
+  EXPECT_TRUE(std::isnan(exp(x)[0]) && std::isnan(sin(x)[1]) && std::isnan(cos(x)[2]));
+  x.set(2, -0.0);
+  EXPECT_TRUE(std::signbit((-Pack<double, 4>(0))[3]));
+  EXPECT_FALSE(std::signbit(hamotor::scalar::abs(x)[2]));
+}
+
+TEST(Packs, masks_choose_lane_by_lane) {
+  Pack<double, 4> x(2);
+  x.set(1, -1);
+  const auto negative = x < Pack<double, 4>(0);
+  EXPECT_TRUE(any(negative));
+  EXPECT_FALSE(all(negative));
+  EXPECT_TRUE(all(negative || !negative));
+  EXPECT_FALSE(any(negative && !negative));
+  const auto chosen = select(negative, Pack<double, 4>(7), x);
+  EXPECT_EQ(chosen[0], 2);
+  EXPECT_EQ(chosen[1], 7);
+}
+
+}  // namespace
