@@ -107,19 +107,24 @@ TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
   EXPECT_EQ(hash_in<hamotor::Rkmk4>(sample::forced_se2<Pack<double, 8>>(), plates, 2, 2), plate);
 }
 
-TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
+template <template <class> class Method, class Packs>
+void expect_bits_of_a_run(const Packs& packs) {
   const auto system = sample::forced_so3();
   const auto members = members_of(system, 5);
-  const auto packs = sample::forced_so3<Pack<double, 8>>();
-  Ensemble ensemble(packs, hamotor::Rk4<decltype(packs)>{}, 0.5, step, std::span(members));
+  Ensemble ensemble(packs, Method<Packs>{}, 0.5, step, std::span(members));
   EXPECT_EQ(ensemble.advance(steps), 5U);
   for (std::size_t k = 0; k < 5; ++k) {
     auto state = members[k];
-    hamotor::Rk4<std::remove_cvref_t<decltype(system)>> method;
+    Method<std::remove_cvref_t<decltype(system)>> method;
     for (int n = 0; n < steps; ++n) method.do_step(system, state, 0.0, step);
     EXPECT_EQ(ensemble.state(k), state);
   }
-  EXPECT_EQ(ensemble.time(4), std::fma(double(steps), step, 0.5));
+  EXPECT_EQ(ensemble.time(4), hamotor::mul_add(double(steps), step, 0.5));
+}
+
+TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
+  expect_bits_of_a_run<hamotor::Rk4>(sample::forced_so3<Pack<double, 8>>());
+  expect_bits_of_a_run<Splitting2>(sample::forced_so3<Pack<double, 4>>());
 }
 
 TEST(Ensembles, a_member_that_fails_keeps_its_last_state_and_the_others_go_on) {

@@ -393,17 +393,34 @@ class PrincipalRotation {
     const S x = half_per_momentum * pi[K];
     if constexpr (detail::has_series<S>) {
       // The next turn waits for this one's Π: not for the half angle as well, where it need not.
-      // Packs do not wait, they count operations.
-      if constexpr (!scalar::has_lanes<S>) {
-        if (Increment::is_small(x + x)) {
-          detail::turn_about_axis<K>(Increment::of_small(x), Increment::of_small(x + x), start, pi,
-                                     change);
-          return;
-        }
+      const auto small = Increment::is_small(x + x);
+      if (all(small)) {
+        detail::turn_about_axis<K>(Increment::of_small(x), Increment::of_small(x + x), start, pi,
+                                   change);
+        return;
+      }
+      if constexpr (scalar::has_lanes<S>) {
+        const auto [half, whole] = halves_and_wholes(x);
+        detail::turn_about_axis<K>(half, whole, start, pi, change);
+        return;
       }
     }
     const auto half = Increment::of(x);
     detail::turn_about_axis<K>(half, half.twice(), start, pi, change);
+  }
+
+  struct HalfAndWhole {
+    AngleIncrement<S> half;
+    AngleIncrement<S> whole;
+  };
+
+  /// What each lane's own size asks for.
+  [[nodiscard, gnu::cold, gnu::noinline]] static HalfAndWhole halves_and_wholes(
+      const S& x) noexcept {
+    using Increment = AngleIncrement<S>;
+    const auto half = Increment::of(x);
+    return {half, Increment::chosen(Increment::is_small(x + x), Increment::of_small(x + x),
+                                    half.twice())};
   }
 
   Angular moments_;
