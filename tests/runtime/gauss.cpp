@@ -245,6 +245,53 @@ TEST(Gauss, converges_for_a_stiff_spring_by_newtons_method) {
   EXPECT_NEAR(system.energy(state) / before, 1, 0.2);
 }
 
+/// Nearly symmetric, at 60 rad/s.
+TEST(Gauss, converges_for_a_fast_spin_in_few_iterations) {
+  using Body = hamotor::PivotedBody<sample::SO3, double>;
+  const hamotor::RigidBodies system{std::tuple{Body(1, {1, 1.0001, 1.9}, {0, 0, 0}, {0, 0, 0})}};
+  using System = Of<decltype(system)>;
+  const auto start = [] {
+    StateOf<System> state{};
+    state.motors[0].s = 1;
+    state.momenta[0] = {0.3, 0.2 * 1.0001, 60 * 1.9};
+    return state;
+  }();
+  const auto after = [&](int steps, int most_iterations) {
+    auto state = start;
+    hamotor::Gauss16<System> method;
+    int iterations = 0;
+    for (int k = 0; k < steps; ++k) {
+      method.do_step(system, state, 0, 2.0 / steps);
+      EXPECT_EQ(method.failure(), hamotor::Failure::none);
+      iterations += method.iterations();
+    }
+    EXPECT_LT(iterations, most_iterations * steps);
+    return state;
+  };
+  const auto reference = after(160, 14);
+  EXPECT_LT(distance(after(60, 22), reference), 1e-11);
+  EXPECT_LT(distance(after(40, 60), reference), 1e-9);  // three radians a step
+}
+
+TEST(Gauss, settles_at_rounding_where_positions_have_lost_digits) {
+  const double far = 1e8;
+  const hamotor::RigidBodies system{
+      std::tuple{sample::body()},
+      std::tuple{hamotor::SpringToWorld<0, sample::SE3, double, hamotor::RestLength::zero>{
+          .at = {0.05, 0.1, 0.15}, .anchor = {far, far, -far}, .stiffness = 20, .rest_length = 0}}};
+  using System = Of<decltype(system)>;
+  StateOf<System> state{};
+  state.motors[0] = exp(sample::SE3::Rate<double>{0, 0, 0, far + 0.5, far, -far});
+  state.momenta[0] = {0, 0, 1, 0, 0.3, 0};
+  const auto before = system.energy(state);
+  hamotor::Gauss8<System> method;
+  for (int k = 0; k < 200; ++k) {
+    method.do_step(system, state, 0, 0.01);
+    ASSERT_EQ(method.failure(), hamotor::Failure::none) << k;
+  }
+  EXPECT_NEAR(system.energy(state) / before, 1, 1e-5);
+}
+
 TEST(Gauss, gives_no_number_where_the_stages_do_not_converge) {
   const auto system = sample::forced_se3();
   auto state = generic_state(system);

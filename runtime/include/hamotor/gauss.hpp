@@ -13,6 +13,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "hamotor/canonical_chart.hpp"
 #include "hamotor/compensated.hpp"
 #include "hamotor/gauss_table.hpp"
 #include "hamotor/scalar.hpp"
@@ -24,106 +25,6 @@ namespace hamotor {
 
 namespace detail {
 
-/// B_k/k! for even k (Bernoulli), of which each is about −1/4π² times the one before.
-template <class S>
-[[nodiscard]] constexpr std::array<S, 32> bernoulli_ratios() noexcept {
-  // Σ_{j≤n} c_j/(n + 1 − j)! = 0 for c_j = B_j/j!, n ≥ 1.
-  std::array<S, 65> c{};
-  std::array<S, 66> inverse_factorial{};
-  inverse_factorial[0] = S(1);
-  for (std::size_t k = 1; k < 66; ++k) {
-    inverse_factorial[k] = inverse_factorial[k - 1] / S(static_cast<int>(k));
-  }
-  c[0] = S(1);
-  for (std::size_t k = 1; k < 65; ++k) {
-    S sum(0);
-    for (std::size_t j = 0; j < k; ++j) sum = sum + c[j] * inverse_factorial[k + 1 - j];
-    c[k] = -sum;
-  }
-  std::array<S, 32> even{};
-  for (std::size_t k = 0; k < 32; ++k) even[k] = c[2 * k + 2];
-  return even;
-}
-
-/// B_k/k! for k = 2, 4, …, rounded to S once.
-template <class S>
-struct BernoulliRatios {
-  static inline const auto values = [] {
-    std::array<S, 32> rounded{};
-    const auto exact = bernoulli_ratios<CoefficientScalar<S>>();
-    for (std::size_t k = 0; k < rounded.size(); ++k) rounded[k] = static_cast<S>(exact[k]);
-    return rounded;
-  }();
-};
-
-/// Σ (−1)^k/(k+1)! f^k(y), the series of dexp where f is ad_ξ and of its transpose where f is
-/// ad*_ξ.
-template <class T, class Map>
-[[nodiscard]] constexpr T dexp_series(const T& y, const Map& f) noexcept {
-  using S = typename T::Scalar;
-  T sum = y;
-  T term = y;
-  for (int k = 1; k < most_series_terms; ++k) {
-    term = (S(-1) / S(k + 1)) * f(term);
-    sum = sum + term;
-    if (negligible(term, sum)) break;
-  }
-  return sum;
-}
-
-/// Σ (−1)^k B_k/k! f^k(y), the inverse of `dexp_series`.
-template <class T, class Map>
-[[nodiscard]] constexpr T dexp_series_inverse(const T& y, const Map& f) noexcept {
-  using S = typename T::Scalar;
-  const auto& ratios = BernoulliRatios<S>::values;
-  T power = f(y);
-  T sum = mul_add(S(0.5), power, y);
-  for (std::size_t k = 0; k < ratios.size(); ++k) {
-    if (k > 0) power = f(power);
-    power = f(power);
-    const T term = ratios[k] * power;
-    sum = sum + term;
-    if (negligible(term, sum)) break;
-  }
-  return sum;
-}
-
-/// The rate ξ̇ of M̂ exp ξ with body rate B: dexp_ξ⁻¹ B.
-template <class Rate>
-[[nodiscard]] constexpr Rate chart_rate(const Rate& xi, const Rate& b) noexcept {
-  return dexp_series_inverse(b, [&](const Rate& y) { return ad(xi, y); });
-}
-
-/// The momentum p of the chart, dexp_ξ^T μ.
-template <class Rate, class Momentum>
-[[nodiscard]] constexpr Momentum chart_momentum(const Rate& xi, const Momentum& mu) noexcept {
-  return dexp_series(mu, [&](const Momentum& y) { return coadjoint(xi, y); });
-}
-
-/// The momentum μ of the body, dexp_ξ^−T p.
-template <class Rate, class Momentum>
-[[nodiscard]] constexpr Momentum body_momentum(const Rate& xi, const Momentum& p) noexcept {
-  return dexp_series_inverse(p, [&](const Momentum& y) { return coadjoint(xi, y); });
-}
-
-/// ṗ = d/dt dexp_ξ^T μ at ξ̇ = V and μ̇, which is −∂H/∂ξ at constant p where μ̇ = [μ, B] − F.
-template <class Rate, class Momentum>
-[[nodiscard]] constexpr Momentum chart_force(const Rate& xi, const Rate& v, const Momentum& mu,
-                                             const Momentum& mu_rate) noexcept {
-  using S = typename Rate::Scalar;
-  Momentum term = mu;
-  Momentum change = mu_rate;
-  Momentum sum = mu_rate;
-  for (int k = 1; k < most_series_terms; ++k) {
-    const S by = S(-1) / S(k + 1);
-    change = by * (coadjoint(v, term) + coadjoint(xi, change));
-    term = by * coadjoint(xi, term);
-    sum = sum + change;
-    if (negligible(change, sum) && k > 1) break;
-  }
-  return sum;
-}
-
 [[nodiscard]] constexpr std::string_view gauss_name(std::size_t stages) noexcept {
   constexpr std::array<std::string_view, 8> names{"lie_midpoint", "gauss4",  "gauss6",  "gauss8",
                                                   "gauss10",      "gauss12", "gauss14", "gauss16"};
@@ -134,16 +35,18 @@ template <class Rate, class Momentum>
 
 /// Gauss collocation on the group, s = 1 to 8 stages, order 2s, for any H(M, μ, t).
 ///
-/// With chart momenta p = dexp_ξ^T μ and W = −∂H/∂ξ a stage is
-///     ξ_i = h Σ ã_ij V_j,  p_i = ½(p₀ + p₁) + h Σ ã_ij W_j,  ã_ij = a_ij − b_j/2,
+/// With chart momenta p = dexp_−ξ^T m, m = Ad*⁻¹_{exp ξ} μ the momentum seen from M̂, a stage is
+///     ξ_i = h Σ ã_ij ξ̇_j,  p_i = ½(p₀ + p₁) + h Σ ã_ij ṗ_j,  ã_ij = a_ij − b_j/2,
 /// and momenta obey M₁μ₁M̃₁ = M₀μ₀M̃₀ − h Σ b_i F_i, F_i the stages' spatial forques: where H is
 /// left-invariant, spatial momentum and Casimirs are constant but for rounding.
 ///
-/// V and W are iterated until rounding stops them (Hairer, McLachlan & Razakarivony 2008), from the
-/// last step's polynomials: to a fixed point while that contracts, else by Newton's method with one
-/// Jacobian for many steps, so that stiff springs converge too (up to 48 unknowns a stage: four
-/// bodies in space).  Where neither settles in 20 iterations and one a bit, the state becomes not a
-/// number.
+/// ξ̇ and ṁ are iterated until no component's change shrinks any more, which is where rounding stops
+/// them (Hairer, McLachlan & Razakarivony 2008; Antoñana, Makazaga & Murua 2017), from the last
+/// step's polynomials: to a fixed point while that contracts, else by Newton's method with one
+/// Jacobian for many steps, so that fast spins and stiff springs converge too (up to 48 unknowns a
+/// stage: four bodies in space).  What stopped them is held against what rounding of the stages
+/// does to ξ̇ and ṁ.  Where they settle nowhere else, or not in 20 iterations and one a bit, the
+/// state becomes not a number.
 template <HamiltonianSystem System, std::size_t stages>
 class Gauss {
   static_assert(stages >= 1 && stages <= 8);
@@ -152,9 +55,11 @@ class Gauss {
   using Element = typename G::template Element<S>;
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
+  using Chart = CanonicalChart<G, S>;
   static constexpr std::size_t n = System::bodies;
   static constexpr auto dimension = static_cast<std::size_t>(G::dimension);
-  static constexpr std::size_t unknowns = 2 * n * dimension;
+  static constexpr std::size_t positions = n * dimension;
+  static constexpr std::size_t unknowns = System::has_forque ? 2 * positions : positions;
   static constexpr bool has_newton = unknowns <= 48;
   static constexpr int most_iterations = 20 + scalar::Limits<S>::digits;
   static inline const auto table = detail::gauss_table<S, stages>();
@@ -173,7 +78,7 @@ class Gauss {
     }
     h_ = h;
     for (std::size_t s = 0; s < stages; ++s) step_weights_[s] = h * table.weights[s];
-    begin(state);
+    begin();
     failure_ = solve(system, state, t) ? Failure::none : Failure::no_convergence;
     finish(state);
   }
@@ -199,147 +104,178 @@ class Gauss {
 
  private:
   using Gradients = Gradient<G, n, S>;
-  using Slopes = std::array<Gradients, stages>;
   using Momenta = std::array<Momentum, n>;
   using Vector = detail::Vector<S, unknowns>;
+  /// ξ̇ and ṁ, or B and −F, of all bodies as numbers.
+  using Slopes = std::array<Vector, stages>;
   struct NoNewton {
     static constexpr bool on = false;
   };
   struct Newton {
     bool on = false;
+    bool stale = false;  ///< whether the next step is to begin with a new Jacobian
+    int iterations = 0;  ///< of the first step that began with this one; 0 before
     S h{};
     detail::StageEquations<S, stages, unknowns> equations{};
   };
 
   /// The first guess where nothing is known: what is at the start.
   constexpr void stay(const System& system, const StateOf<System>& state, const S& t) noexcept {
-    const auto now = gradient(system, state, t);
-    for (std::size_t s = 0; s < stages; ++s) {
-      gradients_[s].rates = now.rates;
-      if constexpr (System::has_forque) gradients_[s].forques = now.forques;
-    }
+    gradients_.fill(numbers(gradient(system, state, t)));
   }
 
   /// The first guess after a step of the same length: its polynomials, gone on.
   constexpr void foresee() noexcept {
-    const auto gradients = gradients_;
+    const Slopes before = gradients_;
     for (std::size_t s = 0; s < stages; ++s) {
       gradients_[s] = {};
       for (std::size_t r = 0; r < stages; ++r) {
-        const S& by = table.next[s][r];
+        for (std::size_t k = 0; k < unknowns; ++k) {
+          gradients_[s][k] = mul_add(table.next[s][r], before[r][k], gradients_[s][k]);
+        }
+      }
+    }
+  }
+
+  /// Charts and slopes that the guess of B and F leads to.
+  constexpr void begin() noexcept {
+    slopes_ = gradients_;
+    for (int sweep = 0; sweep < 3; ++sweep) {
+      for (std::size_t s = 0; s < stages; ++s) {
+        for (std::size_t i = 0; i < n; ++i) charts_[s][i] = Chart(displacement(s, i));
+      }
+      for (std::size_t s = 0; s < stages; ++s) {
         for (std::size_t i = 0; i < n; ++i) {
-          auto& there = gradients_[s];
-          there.rates[i] = mul_add(by, gradients[r].rates[i], there.rates[i]);
+          put(slopes_[s], i, charts_[s][i].rate(rate(gradients_[s], i)));
           if constexpr (System::has_forque) {
-            there.forques[i] = mul_add(by, gradients[r].forques[i], there.forques[i]);
+            if (sweep == 2) {
+              put_push(slopes_[s], i,
+                       Ad_star_inverse(exp(charts_[s][i].xi()), push(gradients_[s], i)));
+            }
           }
         }
       }
     }
-  }
-
-  /// From the first guess.
-  constexpr void begin(const StateOf<System>& state) noexcept {
-    xi_ = {};
     beside_ = {};
-    place(state);
   }
 
-  /// The charts and the momenta that rates and forques of the stages lead to.
-  ///
-  /// Momenta are seen from half-way, m = Ad*⁻¹_{exp ξ} μ with ṁ = −Ad*⁻¹_{exp ξ} F, so that they do
-  /// not turn with the stages while these are iterated: p = dexp_{−ξ}^T m.
+  /// Where slopes lead to: the stages' charts, and momenta seen from half-way.
   constexpr void place(const StateOf<System>& state) noexcept {
-    for (int sweep = 0; sweep < 2; ++sweep) {
-      for (std::size_t s = 0; s < stages; ++s) {
-        for (std::size_t i = 0; i < n; ++i) {
-          rates_[s][i] = detail::chart_rate(xi_[s][i], gradients_[s].rates[i]);
-        }
-      }
-      for (std::size_t s = 0; s < stages; ++s) {
-        for (std::size_t i = 0; i < n; ++i) {
-          xi_[s][i] = {};
-          for (std::size_t r = 0; r < stages; ++r) {
-            xi_[s][i] = mul_add(table.skew[s][r] * step_weights_[r], rates_[r][i], xi_[s][i]);
-          }
-        }
-      }
-    }
     for (std::size_t i = 0; i < n; ++i) {
       Rate x{};
-      std::array<Momentum, stages> pushes{};
-      taken_[i] = {};
+      Momentum gained{};
       for (std::size_t s = 0; s < stages; ++s) {
-        x = mul_add(step_weights_[s], rates_[s][i], x);
-        way_[s][i] = exp(xi_[s][i]);
+        x = mul_add(step_weights_[s], rate(slopes_[s], i), x);
+        charts_[s][i] = Chart(displacement(s, i));
         if constexpr (System::has_forque) {
-          pushes[s] = -step_weights_[s] * Ad_star_inverse(way_[s][i], gradients_[s].forques[i]);
-          taken_[i] = taken_[i] - pushes[s];
+          gained = mul_add(step_weights_[s], push(slopes_[s], i), gained);
         }
       }
+      gained_[i] = gained;
       half_way_[i] = S(0.5) * x;
       half_[i] = exp(half_way_[i]);
       const Momentum first = Ad_star(half_[i], state.momenta[i]);
+      const Momentum mean = mul_add(S(0.5), gained, first);
+      const Chart chart(half_way_[i]);
       const Momentum middle =
-          S(0.5) * (detail::chart_momentum(half_way_[i], first) +
-                    detail::chart_momentum(S(-1) * half_way_[i], first - taken_[i]));
-      const Momentum mean = first - S(0.5) * taken_[i];
-      std::array<Momentum, stages> balanced{};
+          S(0.5) * (chart.opposite().momentum(first) + chart.momentum(first + gained));
       std::array<Momentum, stages> forces{};
       for (std::size_t s = 0; s < stages; ++s) {
-        balanced[s] = mean;
+        balanced_[s][i] = mean;
         if constexpr (System::has_forque) {
           for (std::size_t r = 0; r < stages; ++r) {
-            balanced[s] = mul_add(table.skew[s][r], pushes[r], balanced[s]);
+            balanced_[s][i] =
+                mul_add(table.skew[s][r] * step_weights_[r], push(slopes_[r], i), balanced_[s][i]);
           }
         }
-        forces[s] = detail::chart_force(S(-1) * xi_[s][i], -step_weights_[s] * rates_[s][i],
-                                        balanced[s] + beside_[s][i], pushes[s]);
+        Momentum changes{};
+        if constexpr (System::has_forque) changes = step_weights_[s] * push(slopes_[s], i);
+        forces[s] = charts_[s][i].momentum_rate(step_weights_[s] * rate(slopes_[s], i),
+                                                balanced_[s][i] + beside_[s][i], changes);
       }
       for (std::size_t s = 0; s < stages; ++s) {
         Momentum p = middle;
         for (std::size_t r = 0; r < stages; ++r) p = mul_add(table.skew[s][r], forces[r], p);
-        const Momentum m = detail::body_momentum(S(-1) * xi_[s][i], p);
-        beside_[s][i] = m - balanced[s];
-        momenta_[s][i] = Ad_star(way_[s][i], m);
+        momenta_[s][i] = charts_[s][i].seen_from_center(p);
+        beside_[s][i] = momenta_[s][i] - balanced_[s][i];
       }
     }
   }
 
-  /// By how much rates and forques there differ from those that led there.
+  /// By how much slopes there differ from those that led there.
   [[nodiscard]] constexpr Slopes residual(const System& system, const StateOf<System>& state,
                                           const S& t) noexcept {
-    StateOf<System> center = state;
-    for (std::size_t i = 0; i < n; ++i) center.motors[i] = gp(state.motors[i], half_[i]);
+    const StateOf<System> center = half_way(state);
     Slopes difference{};
     for (std::size_t s = 0; s < stages; ++s) {
-      StateOf<System> there{{}, momenta_[s]};
-      for (std::size_t i = 0; i < n; ++i) there.motors[i] = gp(center.motors[i], way_[s][i]);
       const S then = mul_add(table.nodes[s], h_, t);
-      const auto now = gradient(system, there, then);
-      if constexpr (PoweredSystem<System>) power_[s] = system.power(there, then);
-      for (std::size_t i = 0; i < n; ++i) {
-        difference[s].rates[i] = now.rates[i] - gradients_[s].rates[i];
-        if constexpr (System::has_forque) {
-          difference[s].forques[i] = now.forques[i] - gradients_[s].forques[i];
-        }
-      }
+      const Seen seen = slope(system, center, charts_[s], momenta_[s], then);
+      if constexpr (PoweredSystem<System>) power_[s] = system.power(seen.state, then);
+      gradients_[s] = seen.gradient;
+      difference[s] = less(seen.slope, slopes_[s]);
     }
     return difference;
+  }
+
+  /// The state with its motors half-way.
+  [[nodiscard]] constexpr StateOf<System> half_way(const StateOf<System>& state) const noexcept {
+    StateOf<System> center = state;
+    for (std::size_t i = 0; i < n; ++i) center.motors[i] = gp(state.motors[i], half_[i]);
+    return center;
+  }
+
+  /// What is at a point of the charts.
+  struct Seen {
+    StateOf<System> state;
+    Vector gradient{};  ///< B and −F
+    Vector slope{};     ///< ξ̇ and ṁ
+  };
+
+  [[nodiscard, gnu::flatten]] static constexpr Seen slope(const System& system,
+                                                          const StateOf<System>& center,
+                                                          const std::array<Chart, n>& charts,
+                                                          const Momenta& m, const S& t) noexcept {
+    Seen seen{center};
+    std::array<Element, n> way{};
+    for (std::size_t i = 0; i < n; ++i) {
+      if constexpr (System::has_forque) {
+        way[i] = exp(charts[i].xi());
+        seen.state.motors[i] = gp(center.motors[i], way[i]);
+        seen.state.momenta[i] = Ad_star(way[i], m[i]);
+      } else {  // H does not know the motors.
+        seen.state.momenta[i] = charts[i].body_momentum(m[i]);
+      }
+    }
+    const auto now = hamotor::gradient(system, seen.state, t);
+    seen.gradient = numbers(now);
+    for (std::size_t i = 0; i < n; ++i) {
+      put(seen.slope, i, charts[i].rate(now.rates[i]));
+      if constexpr (System::has_forque) {
+        put_push(seen.slope, i, S(-1) * Ad_star_inverse(way[i], now.forques[i]));
+      }
+    }
+    return seen;
   }
 
   /// Iterates the stages; false where they do not settle.
   [[nodiscard]] constexpr bool solve(const System& system, const StateOf<System>& state,
                                      const S& t) noexcept {
-    const auto guess = gradients_;
+    const Slopes guess = slopes_;
+    place(state);
     S before(0);
-    int since = 0;  // iterations in this way
+    int since = 0;                         // iterations in this way
+    bool fresh = false;                    // whether Newton's Jacobian is of this step
+    [[maybe_unused]] bool begins = false;  // and of its start
     for (iterations_ = 1; iterations_ <= most_iterations; ++iterations_) {
       Slopes by = residual(system, state, t);
       if constexpr (has_newton) {
         if (newton_.on) {
-          if (newton_.h != h_) linearise(system, state, t);
-          by = corrected(by);
+          if (iterations_ == 1 && (newton_.stale || newton_.h != h_)) {
+            linearise(system, state, t);
+            begins = true;
+            fresh = true;
+          }
+          by = newton_.equations.solve(table, by);
         }
       }
       const S change = size(by);
@@ -347,17 +283,27 @@ class Gauss {
       if (iterations_ == 1) foresees_ = change < S(0.05);
       ++since;
       const bool finite = change - change == S(0);
+      const bool shrinks = shrunk(by, since == 1);
       const bool small = change <= S(65536) * scalar::Limits<S>::epsilon();
       const bool slow = since > 2 && change > S(0.25) * before;
-      if (!finite || (slow && !small)) {
+      // The first two need not show all components.
+      const bool settled =
+          finite && since > 2 && !shrinks && (small || is_rounding(system, state, t, by));
+      // A second Jacobian in a step helps only where the first was of another place.
+      const bool stuck = slow && (!fresh || change > S(0.75) * before);
+      if (!finite || (stuck && !small && !settled)) {
         if constexpr (has_newton) {
           if (!finite || (!newton_.on && change > S(0.1))) {
             if (newton_.on && since == 1) return false;
-            gradients_ = guess;
-            begin(state);
+            slopes_ = guess;
+            beside_ = {};
+            place(state);
           }
           newton_.on = true;
           linearise(system, state, t);
+          newton_.iterations = 0;  // known better at the next step's start
+          begins = false;
+          fresh = true;
           since = 0;
           continue;
         } else if (!finite) {
@@ -365,35 +311,98 @@ class Gauss {
         }
       }
       for (std::size_t s = 0; s < stages; ++s) {
-        for (std::size_t i = 0; i < n; ++i) {
-          gradients_[s].rates[i] = gradients_[s].rates[i] + by[s].rates[i];
-          if constexpr (System::has_forque) {
-            gradients_[s].forques[i] = gradients_[s].forques[i] + by[s].forques[i];
-          }
-        }
+        for (std::size_t k = 0; k < unknowns; ++k) slopes_[s][k] = slopes_[s][k] + by[s][k];
       }
       place(state);
-      // Rounding is reached where small changes shrink no more; the first two need not show all
-      // components.
-      if (since > 2 && small && (change <= S(0) || !(change < before))) return true;
+      if (settled) {
+        if constexpr (has_newton) {
+          if (begins) newton_.iterations = iterations_;
+          newton_.stale = iterations_ > newton_.iterations + 2;
+        }
+        return true;
+      }
       before = change;
     }
     return false;
   }
 
-  /// The size of a change of rates and forques, relative to Σ |μ B|.
+  /// Whether any component's change is less than half of what it was at its lowest.
+  [[nodiscard]] constexpr bool shrunk(const Slopes& by, bool is_first) noexcept {
+    bool any = false;
+    for (std::size_t k = 0; k < unknowns; ++k) {
+      const S now = largest_of(by, k);
+      if (is_first || now < S(0.5) * lowest_[k]) {
+        any = any || now > S(0);
+        lowest_[k] = now;
+      }
+    }
+    return any;
+  }
+
+  [[nodiscard]] static constexpr S largest_of(const Slopes& by, std::size_t k) noexcept {
+    S largest(0);
+    for (const Vector& x : by) largest = scalar::max_abs(largest, x[k]);
+    return largest;
+  }
+
+  /// Whether a change is no more than what rounding of the stages' states makes it.
+  [[nodiscard]] constexpr bool is_rounding(const System& system, const StateOf<System>& state,
+                                           const S& t, const Slopes& by) noexcept {
+    const S epsilon = scalar::Limits<S>::epsilon();
+    const auto rounded = [&](auto& x) {
+      auto numbers = x.components();
+      for (std::size_t k = 0; k < numbers.size(); ++k) {
+        numbers[k] = mul_add(k % 2 == 0 ? epsilon : -epsilon, numbers[k], numbers[k]);
+      }
+      x = std::remove_reference_t<decltype(x)>::from(numbers);
+    };
+    const StateOf<System> center = half_way(state);
+    auto off = center;
+    for (auto& motor : off.motors) rounded(motor);
+    Slopes noise{};
+    for (std::size_t s = 0; s < stages; ++s) {
+      const S then = mul_add(table.nodes[s], h_, t);
+      auto charts = charts_[s];
+      auto momenta = momenta_[s];
+      for (std::size_t i = 0; i < n; ++i) {
+        Rate xi = charts[i].xi();
+        rounded(xi);
+        charts[i] = Chart(xi);
+        // The balance of p, of which m is made.
+        Momentum p = charts_[s][i].momentum(momenta[i]);
+        rounded(p);
+        momenta[i] = charts[i].seen_from_center(p);
+      }
+      noise[s] = less(slope(system, off, charts, momenta, then).slope,
+                      slope(system, center, charts_[s], momenta_[s], then).slope);
+    }
+    if constexpr (has_newton) {
+      if (newton_.on) noise = newton_.equations.solve(table, noise);
+    }
+    for (std::size_t k = 0; k < unknowns; ++k) {
+      const S bound = S(64) * largest_of(noise, k) + S(65536) * epsilon * largest_of(slopes_, k);
+      if (!(largest_of(by, k) <= bound)) return false;
+    }
+    return true;
+  }
+
+  /// The size of a change of slopes, relative to Σ |ξ̇ m|.
   [[nodiscard]] constexpr S size(const Slopes& by) const noexcept {
     S changed(0);
     S whole(0);
     S both(0);
     for (std::size_t s = 0; s < stages; ++s) {
       for (std::size_t i = 0; i < n; ++i) {
-        add_sizes(by[s].rates[i], momenta_[s][i], changed);
-        add_sizes(gradients_[s].rates[i], momenta_[s][i], whole);
-        if constexpr (System::has_forque) {
-          const Momentum push = h_ * by[s].forques[i];
-          add_sizes(gradients_[s].rates[i], push, changed);
-          add_sizes(by[s].rates[i], push, both);
+        const auto m = momenta_[s][i].components();
+        for (std::size_t k = 0; k < dimension; ++k) {
+          const std::size_t at = i * dimension + k;
+          changed = changed + scalar::abs(by[s][at] * m[k]);
+          whole = whole + scalar::abs(slopes_[s][at] * m[k]);
+          if constexpr (System::has_forque) {
+            const S pushed = h_ * by[s][positions + at];
+            changed = changed + scalar::abs(slopes_[s][at] * pushed);
+            both = both + scalar::abs(by[s][at] * pushed);
+          }
         }
       }
     }
@@ -401,99 +410,88 @@ class Gauss {
     return select(whole > S(0), changed / whole + scalar::sqrt(both / whole), changed + both);
   }
 
-  /// Adds Σ |V_k μ_k|.
-  static constexpr void add_sizes(const Rate& v, const Momentum& mu, S& sum) noexcept {
-    const auto x = v.components();
-    const auto y = mu.components();
-    for (std::size_t k = 0; k < x.size(); ++k) sum = sum + scalar::abs(x[k] * y[k]);
-  }
-
-  /// Newton's change of rates and forques for a difference of them.
-  [[nodiscard]] constexpr Slopes corrected(const Slopes& difference) const noexcept {
-    typename detail::StageEquations<S, stages, unknowns>::Slopes r{};
-    for (std::size_t s = 0; s < stages; ++s) r[s] = numbers(difference[s]);
-    r = newton_.equations.solve(table, r);
-    Slopes by{};
-    for (std::size_t s = 0; s < stages; ++s) {
-      for (std::size_t i = 0; i < n; ++i) {
-        std::array<S, dimension> rate{};
-        std::array<S, dimension> forque{};
-        for (std::size_t k = 0; k < dimension; ++k) {
-          rate[k] = r[s][i * dimension + k];
-          forque[k] = -r[s][(n + i) * dimension + k];
-        }
-        by[s].rates[i] = Rate::from(rate);
-        by[s].forques[i] = Momentum::from(forque);
-      }
-    }
-    return by;
-  }
-
-  /// B and −F, which displacements and pushes grow by.
-  [[nodiscard]] static constexpr Vector numbers(const Gradients& slope) noexcept {
-    Vector x{};
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto rate = slope.rates[i].components();
-      for (std::size_t k = 0; k < dimension; ++k) x[i * dimension + k] = rate[k];
-      if constexpr (System::has_forque) {
-        const auto forque = slope.forques[i].components();
-        for (std::size_t k = 0; k < dimension; ++k) x[(n + i) * dimension + k] = -forque[k];
-      }
-    }
-    return x;
-  }
-
-  /// The Jacobian of (B, −F) at the middle stage for displacements η and pushes φ that change its
-  /// motor to M exp η and its momentum to μ + ad*_η μ + φ, by differences of the gradient: Newton's
-  /// method asks no more of it than to be near.
+  /// The Jacobian of ξ̇ and ṁ in the middle, by differences of the gradient: Newton's method asks no
+  /// more of it than to be near.
+  ///
+  /// What is common to all stages moves M̂ instead of ξ, on which the first and the last stage are
+  /// asked.
   constexpr void linearise(const System& system, const StateOf<System>& state,
                            const S& t) noexcept {
-    constexpr std::size_t at = stages / 2;
-    StateOf<System> center = state;
+    const StateOf<System> center = half_way(state);
+    const std::array<Chart, n> middle{};
+    Momenta momenta{};
     for (std::size_t i = 0; i < n; ++i) {
-      center.motors[i] = gp(gp(state.motors[i], half_[i]), way_[at][i]);
-      center.momenta[i] = momenta_[at][i];
+      momenta[i] = mul_add(S(0.5), gained_[i], Ad_star(half_[i], state.momenta[i]));
     }
-    const S then = mul_add(table.nodes[at], h_, t);
-    const auto slope = gradient(system, center, then);
-    const Vector here = numbers(slope);
-    const S root = scalar::sqrt(scalar::Limits<S>::epsilon());
-    detail::Matrix<S, unknowns> jacobian{};
-    for (std::size_t i = 0; i < n; ++i) {
-      // Of what the step does not move, little is known.
-      const auto rate = slope.rates[i].components();
-      const S moved = scalar::abs(h_) * detail::largest(slope.rates[i]);
-      S pushed = detail::largest(center.momenta[i]);
-      if constexpr (System::has_forque) {
-        pushed = pushed + scalar::abs(h_) * detail::largest(slope.forques[i]);
-      }
-      for (std::size_t k = 0; k < dimension; ++k) {
-        const S step = root * (scalar::abs(h_ * rate[k]) + S(0.01) * moved +
-                               root * detail::largest(center.motors[i]));
-        std::array<S, dimension> unit{};
-        unit[k] = step;
-        const Rate eta = Rate::from(unit);
-        StateOf<System> there = center;
-        there.motors[i] = center.motors[i] + detail::motor_change(center.motors[i], eta);
-        there.momenta[i] = center.momenta[i] + coadjoint(eta, center.momenta[i]);
-        fill(jacobian, i * dimension + k, here, numbers(gradient(system, there, then)), step);
-        if (!(pushed > S(0))) continue;
-        unit[k] = root * pushed;
-        there = center;
-        there.momenta[i] = center.momenta[i] + Momentum::from(unit);
-        fill(jacobian, (n + i) * dimension + k, here, numbers(gradient(system, there, then)),
-             unit[k]);
+    using Matrix = detail::Matrix<S, unknowns>;
+    const Matrix jacobian = differences(
+        system, center, middle, momenta, mul_add(S(0.5), h_, t),
+        [](auto&, auto& charts, auto&, std::size_t i, const Rate& by) { charts[i] = Chart(by); });
+    const auto common = [&](std::size_t s) {
+      return differences(system, center, charts_[s], momenta_[s], mul_add(table.nodes[s], h_, t),
+                         [&](auto& moved, auto&, auto& m, std::size_t i, const Rate& by) {
+                           // δM̂ = M̂ dexp_{X/2}(δX/2).
+                           const Rate eta = Chart(half_way_[i]).body_rate(by);
+                           moved.motors[i] =
+                               moved.motors[i] + detail::motor_change(moved.motors[i], eta);
+                           m[i] = m[i] + coadjoint(eta, m[i]);
+                         });
+    };
+    Matrix mean = common(0);
+    Matrix slope{};
+    if constexpr (stages > 1) {
+      const Matrix first = mean;
+      const Matrix last = common(stages - 1);
+      for (std::size_t row = 0; row < unknowns; ++row) {
+        for (std::size_t k = 0; k < unknowns; ++k) {
+          mean[row][k] = S(0.5) * (first[row][k] + last[row][k]);
+          slope[row][k] = S(0.5) * (last[row][k] - first[row][k]) / table.legendre[1][stages - 1];
+        }
       }
     }
     newton_.h = h_;
-    newton_.equations.set(jacobian, h_);
+    newton_.equations.set(jacobian, mean, slope, h_);
   }
 
-  static constexpr void fill(detail::Matrix<S, unknowns>& jacobian, std::size_t column,
-                             const Vector& here, const Vector& there, const S& step) noexcept {
-    for (std::size_t row = 0; row < unknowns; ++row) {
-      jacobian[row][column] = (there[row] - here[row]) / step;
+  /// Of ξ̇ and ṁ, by rates that `move` takes and by m.
+  template <class Move>
+  [[nodiscard]] constexpr detail::Matrix<S, unknowns> differences(
+      const System& system, const StateOf<System>& center, const std::array<Chart, n>& charts,
+      const Momenta& momenta, const S& t, const Move& move) const noexcept {
+    detail::Matrix<S, unknowns> jacobian{};
+    const Vector here = slope(system, center, charts, momenta, t).slope;
+    const S root = scalar::sqrt(scalar::Limits<S>::epsilon());
+    const auto fill = [&](std::size_t column, const Vector& there, const S& step) {
+      for (std::size_t row = 0; row < unknowns; ++row) {
+        jacobian[row][column] = (there[row] - here[row]) / step;
+      }
+    };
+    for (std::size_t i = 0; i < n; ++i) {
+      // Of what the step does not move, little is known.
+      const auto rates = rate(slopes_[stages / 2], i).components();
+      const S moved = scalar::abs(h_) * detail::largest(rate(slopes_[stages / 2], i));
+      const S pushed = detail::largest(momenta[i]) + detail::largest(gained_[i]);
+      for (std::size_t k = 0; k < dimension; ++k) {
+        std::array<S, dimension> unit{};
+        unit[k] = root * (scalar::abs(h_ * rates[k]) + S(0.01) * moved +
+                          root * detail::largest(center.motors[i]));
+        auto moved_center = center;
+        auto moved_charts = charts;
+        auto moved_momenta = momenta;
+        move(moved_center, moved_charts, moved_momenta, i, Rate::from(unit));
+        fill(i * dimension + k, slope(system, moved_center, moved_charts, moved_momenta, t).slope,
+             unit[k]);
+        if constexpr (System::has_forque) {
+          if (!(pushed > S(0))) continue;
+          unit[k] = root * pushed;
+          moved_momenta = momenta;
+          moved_momenta[i] = momenta[i] + Momentum::from(unit);
+          fill(positions + i * dimension + k, slope(system, center, charts, moved_momenta, t).slope,
+               unit[k]);
+        }
+      }
     }
+    return jacobian;
   }
 
   /// Moves the state; what it loses in each step is kept.
@@ -502,8 +500,10 @@ class Gauss {
     for (std::size_t i = 0; i < n; ++i) {
       const Rate x = S(2) * half_way_[i];
       change.motors[i] = detail::motor_change(state.motors[i], x);
-      change.momenta[i] =
-          detail::momentum_change(state.momenta[i], x) - Ad_star(half_[i], taken_[i]);
+      change.momenta[i] = detail::momentum_change(state.momenta[i], x);
+      if constexpr (System::has_forque) {
+        change.momenta[i] = change.momenta[i] + Ad_star(half_[i], gained_[i]);
+      }
     }
     detail::record(drift_, low_.add(state, change));
     if (failure_ != Failure::none) {
@@ -515,17 +515,59 @@ class Gauss {
     end_ = state;
   }
 
-  std::array<Gradients, stages> gradients_{};        ///< B and F at the stages
-  std::array<Momenta, stages> momenta_{};            ///< μ there
-  std::array<Momenta, stages> beside_{};             ///< m there less the balance of the forques
-  Momenta taken_{};                                  ///< h Σ b Ad*⁻¹ F, seen from half-way
-  std::array<std::array<Rate, n>, stages> rates_{};  ///< V = ξ̇ there
-  std::array<std::array<Rate, n>, stages> xi_{};
-  std::array<std::array<Element, n>, stages> way_{};  ///< exp ξ
-  std::array<Rate, n> half_way_{};                    ///< X/2
-  std::array<Element, n> half_{};                     ///< exp(X/2)
-  std::array<S, stages> step_weights_{};              ///< h b
+  /// ξ of a body at a stage, h Σ ã ξ̇.
+  [[nodiscard]] constexpr Rate displacement(std::size_t s, std::size_t i) const noexcept {
+    Rate xi{};
+    for (std::size_t r = 0; r < stages; ++r) {
+      xi = mul_add(table.skew[s][r] * step_weights_[r], rate(slopes_[r], i), xi);
+    }
+    return xi;
+  }
+
+  /// B and −F.
+  [[nodiscard]] static constexpr Vector numbers(const Gradients& slope) noexcept {
+    Vector x{};
+    for (std::size_t i = 0; i < n; ++i) {
+      put(x, i, slope.rates[i]);
+      if constexpr (System::has_forque) put_push(x, i, S(-1) * slope.forques[i]);
+    }
+    return x;
+  }
+
+  static constexpr void put(Vector& x, std::size_t i, const Rate& b) noexcept {
+    const auto from = b.components();
+    for (std::size_t k = 0; k < dimension; ++k) x[i * dimension + k] = from[k];
+  }
+  static constexpr void put_push(Vector& x, std::size_t i, const Momentum& f) noexcept {
+    const auto from = f.components();
+    for (std::size_t k = 0; k < dimension; ++k) x[positions + i * dimension + k] = from[k];
+  }
+  [[nodiscard]] static constexpr Rate rate(const Vector& x, std::size_t i) noexcept {
+    std::array<S, dimension> b{};
+    for (std::size_t k = 0; k < dimension; ++k) b[k] = x[i * dimension + k];
+    return Rate::from(b);
+  }
+  [[nodiscard]] static constexpr Momentum push(const Vector& x, std::size_t i) noexcept {
+    std::array<S, dimension> f{};
+    for (std::size_t k = 0; k < dimension; ++k) f[k] = x[positions + i * dimension + k];
+    return Momentum::from(f);
+  }
+  [[nodiscard]] static constexpr Vector less(Vector x, const Vector& y) noexcept {
+    for (std::size_t k = 0; k < unknowns; ++k) x[k] = x[k] - y[k];
+    return x;
+  }
+  Slopes slopes_{};     ///< ξ̇ and ṁ at the stages
+  Slopes gradients_{};  ///< B and −F there
+  std::array<std::array<Chart, n>, stages> charts_{};
+  std::array<Momenta, stages> momenta_{};   ///< m
+  std::array<Momenta, stages> balanced_{};  ///< m as the balance of forques has it
+  std::array<Momenta, stages> beside_{};    ///< m less that
+  Momenta gained_{};                        ///< h Σ b ṁ
+  std::array<Rate, n> half_way_{};          ///< X/2
+  std::array<Element, n> half_{};           ///< exp(X/2)
+  std::array<S, stages> step_weights_{};    ///< h b
   std::array<S, stages> power_{};
+  Vector lowest_{};  ///< the smallest change of each component so far
   S h_{};
   StateOf<System> end_{};  ///< what the last step left
   [[no_unique_address]] std::conditional_t<has_newton, Newton, NoNewton> newton_;

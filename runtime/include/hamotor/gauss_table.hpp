@@ -20,6 +20,7 @@ struct GaussTable {
   std::array<std::array<S, stages>, stages> skew;      ///< a_ij/b_j − ½
   std::array<std::array<S, stages>, stages> next;      ///< of stages j, their polynomial at 1 + c_i
   std::array<std::array<S, stages>, stages> legendre;  ///< P_k(2c_j − 1), by k
+  std::array<std::array<S, stages>, stages> coefficients;  ///< (2k + 1) b_j P_k(2c_j − 1), by k
 };
 
 namespace detail {
@@ -85,7 +86,11 @@ template <class S, std::size_t stages>
     weights[j] = (Wide(1) - x * x) / (before * before);
     table.nodes[j] = static_cast<S>((Wide(1) + x) / Wide(2));
     table.weights[j] = static_cast<S>(weights[j]);
-    for (std::size_t k = 0; k < stages; ++k) table.legendre[k][j] = static_cast<S>(p[j][k]);
+    for (std::size_t k = 0; k < stages; ++k) {
+      table.legendre[k][j] = static_cast<S>(p[j][k]);
+      table.coefficients[k][j] =
+          static_cast<S>(Wide(static_cast<int>(2 * k + 1)) * weights[j] * p[j][k]);
+    }
   }
   for (std::size_t i = 0; i < stages; ++i) {
     const auto later = legendre_polynomials<Wide, stages>(p[i][1] + Wide(2));

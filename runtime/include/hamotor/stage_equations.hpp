@@ -18,14 +18,15 @@ using Vector = std::array<S, size>;
 template <class S, std::size_t size>
 using Matrix = std::array<std::array<S, size>, size>;
 
+/// y + A x for A given by its columns, which is a loop without dependences.
 template <class S, std::size_t size>
-[[nodiscard]] constexpr Vector<S, size> times(const Matrix<S, size>& a,
-                                              const Vector<S, size>& x) noexcept {
-  Vector<S, size> result{};
-  for (std::size_t i = 0; i < size; ++i) {
-    for (std::size_t k = 0; k < size; ++k) result[i] = mul_add(a[i][k], x[k], result[i]);
+[[nodiscard]] constexpr Vector<S, size> add_product(const Matrix<S, size>& columns,
+                                                    const Vector<S, size>& x,
+                                                    Vector<S, size> y) noexcept {
+  for (std::size_t k = 0; k < size; ++k) {
+    for (std::size_t i = 0; i < size; ++i) y[i] = mul_add(columns[k][i], x[k], y[i]);
   }
-  return result;
+  return y;
 }
 
 /// A matrix as the product of triangular ones, rows exchanged so that pivots are large.
@@ -69,35 +70,52 @@ class Eliminated {
   std::array<std::size_t, size> rows_{};
 };
 
-/// (1 − h A ⊗ J) δ = r for the collocation matrix A of Gauss's nodes.
+/// δ_i − h J Σ ã_ij δ_j − (C + (2c_i − 1) D) ½ h Σ b_j δ_j = r_i for Gauss's nodes c, weights b and
+/// collocation matrix a, ã_ij = a_ij − b_j/2: what is common to all stages may act otherwise than
+/// what is not, and on each otherwise.
 ///
 /// In Legendre polynomials A is tridiagonal (Hairer & Wanner 1996, IV.5), so that elimination goes
 /// block by block.  The leading blocks are those of fewer stages, which are regular for every
-/// eigenvalue of J without positive real part.
+/// eigenvalue of J without positive real part.  They are inverted once: substitution would wait for
+/// itself.
 template <class S, std::size_t stages, std::size_t size>
 class StageEquations {
  public:
   using Slopes = std::array<Vector<S, size>, stages>;
 
-  constexpr void set(const Matrix<S, size>& jacobian, const S& h) noexcept {
-    jacobian_ = jacobian;
-    h_ = h;
+  constexpr void set(const Matrix<S, size>& jacobian, const Matrix<S, size>& common,
+                     const Matrix<S, size>& slope, const S& h) noexcept {
     Matrix<S, size> block{};
     for (std::size_t i = 0; i < size; ++i) {
-      for (std::size_t k = 0; k < size; ++k) block[i][k] = S(-0.5) * h * jacobian[i][k];
+      for (std::size_t k = 0; k < size; ++k) block[i][k] = S(-0.5) * h * common[i][k];
       block[i][i] = block[i][i] + S(1);
     }
-    blocks_[0] = Eliminated<S, size>(block);
-    for (std::size_t k = 1; k < stages; ++k) {
+    for (std::size_t k = 0; k < stages; ++k) {
+      inverse_[k] = inverse(block);
+      if (k + 1 == stages) break;
+      // A's entries in Legendre polynomials P_k, times h, are ± this.
+      const S by = h / S(static_cast<int>(2 * (2 * k + 1)));
+      const S above = h / S(static_cast<int>(2 * (2 * k + 3)));
+      Matrix<S, size> down{};
+      Matrix<S, size> up{};
+      for (std::size_t column = 0; column < size; ++column) {
+        for (std::size_t row = 0; row < size; ++row) {
+          // From P_0 to P_1 also what is common to all stages.
+          down[column][row] =
+              by * (k == 0 ? jacobian[row][column] + slope[row][column] : jacobian[row][column]);
+          up[column][row] = -above * jacobian[row][column];
+        }
+      }
       block = {};
       for (std::size_t column = 0; column < size; ++column) {
-        Vector<S, size> x{};
-        for (std::size_t i = 0; i < size; ++i) x[i] = jacobian[i][column];
-        x = times(jacobian_, blocks_[k - 1].solve(x));
-        for (std::size_t i = 0; i < size; ++i) block[i][column] = below(k) * above(k - 1) * x[i];
+        down_[k][column] = add_product(down, inverse_[k][column], {});
+        up_[k][column] = add_product(inverse_[k], up[column], {});
       }
-      for (std::size_t i = 0; i < size; ++i) block[i][i] = block[i][i] + S(1);
-      blocks_[k] = Eliminated<S, size>(block);
+      for (std::size_t column = 0; column < size; ++column) {
+        const auto x = add_product(down_[k], up[column], {});
+        for (std::size_t i = 0; i < size; ++i) block[i][column] = -x[i];
+        block[column][column] = block[column][column] + S(1);
+      }
     }
   }
 
@@ -107,20 +125,15 @@ class StageEquations {
     Slopes x{};
     for (std::size_t k = 0; k < stages; ++k) {
       for (std::size_t j = 0; j < stages; ++j) {
-        const S by = S(static_cast<int>(2 * k + 1)) * table.weights[j] * table.legendre[k][j];
-        for (std::size_t i = 0; i < size; ++i) x[k][i] = mul_add(by, r[j][i], x[k][i]);
+        for (std::size_t i = 0; i < size; ++i) {
+          x[k][i] = mul_add(table.coefficients[k][j], r[j][i], x[k][i]);
+        }
       }
     }
-    for (std::size_t k = 1; k < stages; ++k) {
-      const auto y = times(jacobian_, blocks_[k - 1].solve(x[k - 1]));
-      for (std::size_t i = 0; i < size; ++i) x[k][i] = mul_add(below(k), y[i], x[k][i]);
-    }
-    for (std::size_t k = stages; k-- > 0;) {
-      if (k + 1 < stages) {
-        const auto y = times(jacobian_, x[k + 1]);
-        for (std::size_t i = 0; i < size; ++i) x[k][i] = mul_add(-above(k), y[i], x[k][i]);
-      }
-      x[k] = blocks_[k].solve(x[k]);
+    for (std::size_t k = 1; k < stages; ++k) x[k] = add_product(down_[k - 1], x[k - 1], x[k]);
+    x[stages - 1] = add_product(inverse_[stages - 1], x[stages - 1], {});
+    for (std::size_t k = stages - 1; k-- > 0;) {
+      x[k] = add_product(up_[k], x[k + 1], add_product(inverse_[k], x[k], {}));
     }
     Slopes result{};
     for (std::size_t j = 0; j < stages; ++j) {
@@ -134,17 +147,21 @@ class StageEquations {
   }
 
  private:
-  /// A's entries in Legendre polynomials P_k, times h: below the diagonal, and minus above it.
-  [[nodiscard]] constexpr S below(std::size_t k) const noexcept {
-    return h_ / S(static_cast<int>(2 * (2 * k - 1)));
-  }
-  [[nodiscard]] constexpr S above(std::size_t k) const noexcept {
-    return h_ / S(static_cast<int>(2 * (2 * k + 3)));
+  /// By columns.
+  [[nodiscard]] static constexpr Matrix<S, size> inverse(const Matrix<S, size>& a) noexcept {
+    const Eliminated<S, size> eliminated(a);
+    Matrix<S, size> columns{};
+    for (std::size_t k = 0; k < size; ++k) {
+      Vector<S, size> unit{};
+      unit[k] = S(1);
+      columns[k] = eliminated.solve(unit);
+    }
+    return columns;
   }
 
-  Matrix<S, size> jacobian_{};
-  std::array<Eliminated<S, size>, stages> blocks_{};
-  S h_{};
+  std::array<Matrix<S, size>, stages> inverse_{};  ///< of the diagonal blocks
+  std::array<Matrix<S, size>, stages> down_{};     ///< to the next block, after that inverse
+  std::array<Matrix<S, size>, stages> up_{};       ///< from the next block, before it
 };
 
 }  // namespace hamotor::detail
