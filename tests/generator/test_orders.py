@@ -1,44 +1,53 @@
-"""Every explicit and implicit method has its order on every kind of group, free and forced."""
+"""Every method has its order on every kind of group, free and forced."""
 
 from __future__ import annotations
 
-import subprocess
-from pathlib import Path
+import re
+from collections.abc import Sequence
 
 import pytest
+from tests.reference import orders
+from tests.reference.orders import GROUPS, SERIES, TABLE, Observation
 
-from hamotor.run.build import default_cache, default_includes, find_compiler
+from hamotor.scene.methods import METHODS
 
-SOURCE = Path(__file__).parents[1] / "orders" / "orders.cpp"
+METHODS_WITH_AN_ORDER = {method.name for method in METHODS if method.order}
+"""All but the exact one."""
+
+
+def expect_orders(found: Sequence[Observation]) -> None:
+    assert not [o for o in found if o.miss > 0.1]
+
+
+def test_observed_orders_are_within_a_tenth_of_the_nominal() -> None:
+    found = orders.observed_on("SE(2)", quick=True)
+    assert {o.method for o in found} == {"rkmk4", "splitting4", "gauss4"}
+    assert len(found) == 6
+    expect_orders(found)
+
+
+def test_the_table_of_orders_has_every_method_within_a_tenth() -> None:
+    rows = re.findall(r"\n\| (\w+) \| (\d+) \| (.*) \|", TABLE.read_text(encoding="utf-8"))
+    assert {method for method, _, _ in rows} == METHODS_WITH_AN_ORDER
+    cells = [(m, int(p), float(x)) for m, p, row in rows for x in row.split("|") if x.strip()]
+    assert len(cells) == 2 * 16 * len(GROUPS) + 8 * 6 + 2 * 4 + len(SERIES)
+    assert not [cell for cell in cells if abs(cell[2] - cell[1]) > 0.1]
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(
-    ("header", "group", "length"),
-    [
-        ("pga3/se3.hpp", "pga3::SE3", "0.5"),
-        ("pga2/se2.hpp", "pga2::SE2", "1.5"),
-        ("pga4/se4.hpp", "pga4::SE4", "2.5"),
-        ("cga3/sim3.hpp", "cga3::Sim3", "0.5"),
-        ("cga3/so41.hpp", "cga3::SO41", "0.5"),
-    ],
-)
-def test_observed_orders_are_within_a_tenth_of_the_nominal(
-    header: str, group: str, length: str, tmp_path: Path
-) -> None:
-    program = tmp_path / "orders"
-    includes = [f"-I{folder}" for folder in default_includes()]
-    subprocess.run(
-        [
-            *find_compiler(default_cache()).command,
-            *("-std=c++20", "-O1", "-ffp-contract=off", *includes),
-            *(f'-DHEADER="hamotor/{header}"', f"-DGROUP=hamotor::{group}", f"-DLENGTH={length}"),
-            *(str(SOURCE), "-o", str(program)),
-        ],
-        check=True,
-    )
-    lines = subprocess.run([program], check=True, capture_output=True, text=True).stdout.split("\n")
-    found = [line.split() for line in lines if line]
-    assert len(found) == 16
-    for method, nominal, observed in found:
-        assert float(observed) == pytest.approx(int(nominal), abs=0.1), (group, method)
+@pytest.mark.parametrize("group", GROUPS)
+def test_every_method_has_its_order_on(group: str) -> None:
+    found = orders.observed_on(group)
+    assert len(found) == 32
+    expect_orders(found)
+
+
+@pytest.mark.long
+def test_methods_for_rigid_bodies_have_their_orders() -> None:
+    expect_orders(orders.observed_of_rigid_bodies())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("group", SERIES)
+def test_series_have_their_order_on(group: str) -> None:
+    expect_orders([orders.observed_of_series(group)])

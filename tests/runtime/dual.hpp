@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <type_traits>
 
 #include "hamotor/scalar.hpp"
@@ -34,12 +35,18 @@ struct Dual {
   friend constexpr bool operator==(const Dual& a, const Dual& b) = default;
   friend constexpr bool operator<(const Dual& a, const Dual& b) { return a.value < b.value; }
   friend constexpr bool operator>(const Dual& a, const Dual& b) { return b < a; }
+  friend constexpr bool operator<=(const Dual& a, const Dual& b) { return a.value <= b.value; }
+  friend constexpr bool operator>=(const Dual& a, const Dual& b) { return b <= a; }
 };
 
 inline Dual sqrt(const Dual& x) {
   const double root = std::sqrt(x.value);
   return {root, 0.5 * x.slope / root};
 }
+inline Dual exp(const Dual& x) { return {std::exp(x.value), std::exp(x.value) * x.slope}; }
+inline Dual log(const Dual& x) { return {std::log(x.value), x.slope / x.value}; }
+inline Dual sinh(const Dual& x) { return {std::sinh(x.value), std::cosh(x.value) * x.slope}; }
+inline Dual cosh(const Dual& x) { return {std::cosh(x.value), std::sinh(x.value) * x.slope}; }
 inline Dual sin(const Dual& x) { return {std::sin(x.value), std::cos(x.value) * x.slope}; }
 inline Dual cos(const Dual& x) { return {std::cos(x.value), -std::sin(x.value) * x.slope}; }
 inline Dual fma(const Dual& a, const Dual& b, const Dual& c) {
@@ -47,3 +54,7 @@ inline Dual fma(const Dual& a, const Dual& b, const Dual& c) {
 }
 
 }  // namespace sample
+
+/// Rounding is that of the values.
+template <>
+struct hamotor::scalar::Limits<sample::Dual> : std::numeric_limits<double> {};

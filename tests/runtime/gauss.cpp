@@ -37,7 +37,7 @@ struct Squared {
   Base base;
 
   [[nodiscard]] Scalar factor(const Scalar& t) const noexcept {
-    return 1 + Scalar(0.25) * std::sin(3 * t);
+    return 1 + Scalar(0.25) * hamotor::scalar::sin(3 * t);
   }
   [[nodiscard]] Scalar energy(const State& state, const Scalar& t) const noexcept {
     const Scalar e = base.energy(state);
@@ -116,7 +116,7 @@ TEST(Gauss, of_four_stages_has_order_8) {
 
 template <class System>
 void expect_symplectic(const System& system) {
-  const Wide h = Wide(0.15);
+  const double h = 0.15;
   EXPECT_LT((symplectic_defect<Gauss<System, 1>>(system, h)), 1e-12);
   EXPECT_LT((symplectic_defect<Gauss<System, 2>>(system, h)), 1e-12);
   EXPECT_LT((symplectic_defect<Gauss<System, 3>>(system, h)), 1e-12);
@@ -125,14 +125,14 @@ void expect_symplectic(const System& system) {
 }
 
 TEST(Gauss, is_symplectic) {
-  expect_symplectic(sample::free_se3<Wide>());
-  expect_symplectic(sample::forced_se3<Wide>());
-  expect_symplectic(sample::forced_so3<Wide>());
-  expect_symplectic(sample::forced_se2<Wide>());
+  expect_symplectic(sample::free_se3<sample::Dual>());
+  expect_symplectic(sample::forced_se3<sample::Dual>());
+  expect_symplectic(sample::forced_so3<sample::Dual>());
+  expect_symplectic(sample::forced_se2<sample::Dual>());
 }
 
 TEST(Gauss, is_symplectic_where_the_energy_does_not_separate) {
-  const auto base = sample::forced_se2<Wide>();
+  const auto base = sample::forced_se2<sample::Dual>();
   expect_symplectic(Squared<Of<decltype(base)>>{base});
 }
 

@@ -1,4 +1,4 @@
-// Gauss collocation is symplectic on groups that are no rigid motions.
+// Gauss collocation and splittings are symplectic on groups that are no rigid motions.
 #include <gtest/gtest.h>
 
 #include "group_system.hpp"
@@ -11,12 +11,13 @@ namespace {
 
 template <class G>
 void expect_symplectic() {
-  using System = sample::GroupSystem<G, long double>;
-  EXPECT_LT((sample::symplectic_defect<hamotor::Gauss6<System>>(System{}, 0.15L)), 1e-12);
-  EXPECT_GT((sample::symplectic_defect<hamotor::Rkmk4<System>>(System{}, 0.15L)), 1e-8);
+  using System = sample::GroupSystem<G, sample::Dual>;
+  EXPECT_LT((sample::symplectic_defect<hamotor::Gauss6<System>>(System{}, 0.15)), 1e-12);
+  EXPECT_LT((sample::symplectic_defect<hamotor::Splitting8<System>>(System{}, 0.15)), 1e-12);
+  EXPECT_GT((sample::symplectic_defect<hamotor::Rkmk4<System>>(System{}, 0.15)), 1e-8);
 }
 
-TEST(Gauss, is_symplectic_for_similarities) { expect_symplectic<hamotor::cga3::Sim3>(); }
-TEST(Gauss, is_symplectic_for_conformal_motions) { expect_symplectic<hamotor::cga3::SO41>(); }
+TEST(Symplecticity, of_similarities) { expect_symplectic<hamotor::cga3::Sim3>(); }
+TEST(Symplecticity, of_conformal_motions) { expect_symplectic<hamotor::cga3::SO41>(); }
 
 }  // namespace

@@ -1,15 +1,37 @@
-// Whether a step is symplectic on T*G.
+// Whether a step is symplectic on T*G: its Jacobian by dual numbers.
 #pragma once
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <type_traits>
 #include <vector>
 
+#include "dual.hpp"
 #include "sample_systems.hpp"
 
 namespace sample {
+
+namespace detail {
+
+template <template <class> class T>
+T<Dual> with_slope(const T<double>& value, const T<double>& slope) {
+  constexpr std::size_t n = T<double>::names.size();
+  std::array<Dual, n> both{};
+  for (std::size_t k = 0; k < n; ++k) both[k] = {value.components()[k], slope.components()[k]};
+  return T<Dual>::from(both);
+}
+
+template <template <class> class T>
+T<double> part_of(const T<Dual>& x, double Dual::* part) {
+  constexpr std::size_t n = T<double>::names.size();
+  std::array<double, n> components{};
+  for (std::size_t k = 0; k < n; ++k) components[k] = x.components()[k].*part;
+  return T<double>::from(components);
+}
+
+}  // namespace detail
 
 template <class Method, class System>
 auto stepped(const System& system, hamotor::StateOf<System> state, typename System::Scalar h,
@@ -20,57 +42,66 @@ auto stepped(const System& system, hamotor::StateOf<System> state, typename Syst
   return state;
 }
 
-/// By how much a step changes the canonical form of T*G, ω = ρ₂(ξ₁) − ρ₁(ξ₂) + μ([ξ₁, ξ₂]) for
-/// δM = M ξ and δμ = ρ, its Jacobian by differences of fourth order in long double.
+/// By how much a step of a system in dual numbers changes the canonical form of T*G,
+/// ω = ρ₂(ξ₁) − ρ₁(ξ₂) + μ([ξ₁, ξ₂]) for δM = M ξ and δμ = ρ.
 template <class Method, class System>
-double symplectic_defect(const System& system, long double h) {
-  using Wide = long double;
+double symplectic_defect(const System& system, double h) {
+  static_assert(std::is_same_v<typename System::Scalar, Dual>);
   using G = typename System::Group;
-  using Rate = typename G::template Rate<Wide>;
-  using Momentum = typename G::template Momentum<Wide>;
+  using Rate = typename G::template Rate<double>;
+  using Momentum = typename G::template Momentum<double>;
   constexpr auto n = static_cast<std::size_t>(G::dimension);
   struct Tangent {
     Rate xi;
     Momentum rho;
   };
-  const auto start = generic_state(system);
-  const Wide from = Wide(0.3);
-  const auto image = stepped<Method>(system, start, h, 1, from);
-  constexpr Wide e = 1e-4L;
-  const auto moved = [&](const Tangent& by, Wide factor) {
-    auto state = start;
-    state.motors[0] = gp(start.motors[0], exp(factor * by.xi));
-    state.momenta[0] = start.momenta[0] + factor * by.rho;
-    const auto there = stepped<Method>(system, state, h, 1, from);
-    return Tangent{G::log(gp(reverse(image.motors[0]), there.motors[0])),
-                   there.momenta[0] - image.momenta[0]};
+  const auto unit = [](std::size_t a) {
+    std::array<double, n> x{};
+    if (a < n) x[a] = 1;
+    return x;
   };
+  const auto start = generic_state(system);
+  const auto motor = detail::part_of(start.motors[0], &Dual::value);
   std::vector<Tangent> before;
   std::vector<Tangent> after;
+  Momentum image{};
   for (std::size_t a = 0; a < 2 * n; ++a) {
-    std::array<Wide, n> unit{};
-    unit[a % n] = 1;
-    const Tangent basis{a < n ? Rate::from(unit) : Rate{},
-                        a < n ? Momentum{} : Momentum::from(unit)};
-    const auto p1 = moved(basis, e);
-    const auto m1 = moved(basis, -e);
-    const auto p2 = moved(basis, 2 * e);
-    const auto m2 = moved(basis, -2 * e);
+    const Tangent basis{Rate::from(unit(a)), Momentum::from(unit(a - n))};
+    auto state = start;
+    state.motors[0] = detail::with_slope(motor, kinematics(motor, basis.xi));
+    state.momenta[0] =
+        detail::with_slope(detail::part_of(start.momenta[0], &Dual::value), basis.rho);
+    state = stepped<Method>(system, state, Dual(h), 1, Dual(0.3));
+    image = detail::part_of(state.momenta[0], &Dual::value);
+    const auto moved = gp(reverse(detail::part_of(state.motors[0], &Dual::value)),
+                          detail::part_of(state.motors[0], &Dual::slope))
+                           .components();
+    // M~ δM in the generators, each of which has its own blades.
+    std::array<double, n> xi{};
+    for (std::size_t k = 0; k < n; ++k) {
+      const auto generator = kinematics(exp(Rate{}), Rate::from(unit(k))).components();
+      double square = 0;
+      for (std::size_t c = 0; c < moved.size(); ++c) {
+        xi[k] += generator[c] * moved[c];
+        square += generator[c] * generator[c];
+      }
+      xi[k] /= square;
+    }
     before.push_back(basis);
-    after.push_back({(1 / (12 * e)) * (Wide(8) * (p1.xi - m1.xi) - (p2.xi - m2.xi)),
-                     (1 / (12 * e)) * (Wide(8) * (p1.rho - m1.rho) - (p2.rho - m2.rho))});
+    after.push_back({Rate::from(xi), detail::part_of(state.momenta[0], &Dual::slope)});
   }
   const auto form = [](const Tangent& a, const Tangent& b, const Momentum& mu) {
     return pairing(b.rho, a.xi) - pairing(a.rho, b.xi) + pairing(mu, ad(a.xi, b.xi));
   };
-  Wide worst = 0;
+  const auto at = detail::part_of(start.momenta[0], &Dual::value);
+  double worst = 0;
   for (std::size_t a = 0; a < 2 * n; ++a) {
     for (std::size_t b = 0; b < a; ++b) {
-      worst = std::max(worst, std::abs(form(after[a], after[b], image.momenta[0]) -
-                                       form(before[a], before[b], start.momenta[0])));
+      worst = std::max(worst,
+                       std::abs(form(after[a], after[b], image) - form(before[a], before[b], at)));
     }
   }
-  return static_cast<double>(worst);
+  return worst;
 }
 
 }  // namespace sample

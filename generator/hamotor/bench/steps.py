@@ -7,8 +7,10 @@ interleaved, and a time is the median of them. The error is the distance at the 
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import geometric_mean, median
@@ -20,8 +22,18 @@ from hamotor.run.comparison import compare
 from hamotor.run.result import Run
 from hamotor.run.simulation import Simulation, load
 
-SCENES: Final = ("tumble", "heavy_top", "spring_pendulum", "breathing_body")
+SCENES: Final = (
+    "planar",
+    "tumble",
+    "spring_pendulum",
+    "heavy_top",
+    "free4",
+    "breathing_body",
+    "conformal_top",
+)
+"""One for each group: SE(2), SE(3) free and forced, SO(3), SE(4), Sim(3), SO(4,1)."""
 STEPS: Final = 2000
+QUICK_STEPS: Final = 200
 REFERENCES: Final = (("splitting8", 4), ("rkmk87", 4))
 """Methods with how many times shorter their steps are; the first that a scene has is taken."""
 BASELINE: Final = "rkmk4"
@@ -59,10 +71,10 @@ def bench_steps(
 ) -> dict[str, Any]:
     """Run and account for the benchmark of steps.
 
-    scenes: names or paths; four bundled ones if not given.  out: where steps.json goes; None:
+    scenes: names or paths; one for each group if not given.  out: where steps.json goes; None:
     nowhere.  json: print the account on stdout instead of the table.  quick: three repetitions
-    instead of nine, and one method a family.  Returns the account.  Raises UsageError and ToolError
-    as `hamotor run` does.
+    instead of nine, of a tenth of the steps, and one method a family.  Returns the account.
+    Raises UsageError and ToolError as `hamotor run` does.
     """
     rows: list[Row] = []
     for scene in scenes or SCENES:
@@ -85,7 +97,7 @@ def _rows(simulation: Simulation, *, quick: bool) -> list[Row]:
     step = simulation.step
     if step is None:
         raise UsageError(f"{simulation.name}: has a tolerance; the benchmark needs [time] step")
-    steps = min(STEPS, max(round(simulation.end / step), 1))
+    steps = min(QUICK_STEPS if quick else STEPS, max(round(simulation.end / step), 1))
     end = steps * step
     contestants = _contestants(simulation, quick=quick)
     times: dict[tuple[str, str], list[float]] = {c: [] for c in contestants}
@@ -103,7 +115,7 @@ def _rows(simulation: Simulation, *, quick: bool) -> list[Row]:
             )
             times[form, method].append(float(run.report["timing"]["ns_per_step"]))
             runs[form, method] = run
-    method, finer = next(r for r in REFERENCES if r[0] in simulation.offered(*FORMS["generated"]))
+    method, finer = _reference(simulation)
     reference = simulation.run(
         end=end, step=step / finer, every=steps * finer, method=method, scalar="long_double"
     )
@@ -162,7 +174,13 @@ def families(rows: Sequence[Row]) -> list[FamilyRatio]:
     ]
 
 
+def _reference(simulation: Simulation) -> tuple[str, int]:
+    """The method of the reference, and how many times shorter its steps are."""
+    return next(r for r in REFERENCES if r[0] in simulation.offered(*FORMS["generated"]))
+
+
 def _contestants(simulation: Simulation, *, quick: bool) -> list[tuple[str, str]]:
+    """Forms with methods, all of them compiled, on as many processors as there are."""
     found = []
     for form, (kernels, representation) in FORMS.items():
         offered = simulation.offered(kernels, representation)
@@ -173,6 +191,19 @@ def _contestants(simulation: Simulation, *, quick: bool) -> list[tuple[str, str]
         except UsageError:
             continue  # a group without this form
         found += [(form, method) for method in (_one_a_family(offered) if quick else offered)]
+
+    def compiled(form: str, method: str, scalar: str = "double") -> None:
+        kernels, representation = FORMS[form]
+        simulation.compile(
+            scalar=scalar, kernels=kernels, representation=representation, method=method
+        )
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        waiting = [pool.submit(compiled, *contestant) for contestant in found]
+        method, _ = _reference(simulation)
+        waiting.append(pool.submit(compiled, "generated", method, "long_double"))
+        for one in waiting:
+            one.result()
     return found
 
 

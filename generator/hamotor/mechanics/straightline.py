@@ -20,6 +20,14 @@ from hamotor.codegen.program import (
 )
 from hamotor.mechanics.coordinates import Expr
 
+SINE_RATIO = sympy.Function("sine_ratio", real=True)
+"""(sin x)/x of x²."""
+COSINE_LESS_ONE = sympy.Function("cosine_less_one", real=True)
+"""cos x − 1 of x²."""
+SINH_RATIO = sympy.Function("sinh_ratio", real=True)
+"""(sinh x)/x of x²."""
+COSH_LESS_ONE = sympy.Function("cosh_less_one", real=True)
+"""cosh x − 1 of x²."""
 FUNCTIONS = {
     sympy.exp: "exp",
     sympy.log: "log",
@@ -35,6 +43,10 @@ FUNCTIONS = {
     sympy.tanh: "tanh",
     sympy.Abs: "abs",
     sympy.sign: "sign",
+    SINE_RATIO: "sine_ratio",
+    COSINE_LESS_ONE: "cosine_less_one",
+    SINH_RATIO: "sinh_ratio",
+    COSH_LESS_ONE: "cosh_less_one",
 }
 """The functions that a program may call, by the name the runtime has for them."""
 MOST_MULTIPLICATIONS = 64

@@ -97,6 +97,11 @@ class System:
         return self._program(self._rates | self.forques, self.pulls)
 
     @cached_property
+    def rate(self) -> Program:
+        """B of every body: outputs `rate{k}.NAME`."""
+        return self._program(self._rates)
+
+    @cached_property
     def forque(self) -> Program:
         """F of every body: outputs `forque{k}.NAME`."""
         return self._program(self.forques, self.pulls)

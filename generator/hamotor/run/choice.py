@@ -21,7 +21,7 @@ _PRESERVING = {
     ),
 }
 _FALLBACKS = ("splitting2", "rkmk4")
-_LIKE = {"several": "asymmetric", "forced": "general"}
+_LIKE = {"several": "asymmetric", "parts": "general", "forced": "general"}
 """What a structure without measurements of its own is likened to, where a tolerance is given."""
 _ROUGH = "rkmk54", "it chooses its steps, so that it can shorten them at corners; not measured"
 

@@ -368,8 +368,6 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
     Raises UsageError for an unknown name or a mistake in the file, naming file and key.
     """
     from hamotor.scene import (
-        Form,
-        Scene,
         find_scene,
         folder_of,
         methods_offered,
@@ -403,7 +401,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "spec_hash": found.sha256,
             "structure": structure_of(found),
             "ensemble": asdict(found.ensemble),
-            "methods": methods_offered(found.form if isinstance(found, Scene) else Form.GENERAL),
+            "methods": methods_offered(found.form),
         }
 
     def source(*choice: str) -> str:
@@ -431,7 +429,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
 def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) -> Simulation:
     """A Hamiltonian made in Python, ready to run; see `hamotor.scene.building.general_scene`."""
-    from hamotor.scene import Form, methods_offered, scene_source
+    from hamotor.scene import methods_offered, scene_source
     from hamotor.scene.building import general_scene
     from hamotor.scene.exact import text
     from hamotor.scene.matrix_source import matrix_source
@@ -449,7 +447,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
         method=scene.time.method,
         every=scene.output.every,
         spec_hash=scene.sha256,
-        methods=methods_offered(Form.GENERAL),
+        methods=methods_offered(scene.form),
         structure=structure_of(scene),
         read=lambda: scene,
         matrix_source=lambda scalar: matrix_source(scene, scalar),

@@ -21,6 +21,7 @@ from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.draws import ALIKE, Ensemble
 from hamotor.scene.exact import decimal, rounded, with_digits
 from hamotor.scene.groups import Group
+from hamotor.scene.methods import Form
 from hamotor.scene.model import Event, Output, Time
 from hamotor.scene.motors import Vector
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from hamotor.mechanics.coordinates import Coordinates
     from hamotor.mechanics.hamiltonian import Hamiltonian
     from hamotor.mechanics.lagrangian import Lagrangian
+    from hamotor.mechanics.parts import Parts
     from hamotor.mechanics.system import System
 
 Exact = tuple[Fraction, ...]
@@ -105,6 +107,19 @@ class GeneralScene:
         from hamotor.mechanics.system import System
 
         return System(self.hamiltonian)
+
+    @cached_property
+    def parts(self) -> Parts | None:
+        """The kinetic energy of each body in parts whose motion is known; None where H is not
+        ½ μᵀAμ + U(M) with constant A."""
+        from hamotor.mechanics.parts import kinetic_parts
+
+        return None if self.lagrangian is not None else kinetic_parts(self.hamiltonian)
+
+    @property
+    def form(self) -> Form:
+        """What kinds of methods step it."""
+        return Form.GENERAL if self.parts is None else Form.GENERAL | Form.PARTS
 
     @cached_property
     def conserved(self) -> tuple[ConservedQuantity, ...]:

@@ -14,6 +14,7 @@ from hamotor.codegen.program import Number, Program
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.lagrangian import Lagrangian
 from hamotor.mechanics.legendre import LagrangianSystem
+from hamotor.mechanics.parts import Part, energy_text, is_exact, motion, rate_of
 from hamotor.mechanics.proof import prove_energy_balance
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
@@ -84,7 +85,7 @@ def general_source(
     if scene.lagrangian is not None:
         own_system = _lagrangian(scene.lagrangian, group_type, by_name)
     else:
-        own_system = _hamiltonian(scene)
+        own_system = _hamiltonian(scene) | {"parts": None if by_name else _parts(scene)}
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
     names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
     units = ["m"] * first.dimension
@@ -194,6 +195,57 @@ def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
     }
 
 
+def _parts(scene: GeneralScene) -> dict[str, Any] | None:
+    """The known motions of a kinetic energy, for the template."""
+    if scene.parts is None:
+        return None
+    system, count = scene.system, len(scene.bodies)
+    rate, forque = ProgramText(system.rate), ProgramText(system.forque)
+    flows: list[dict[str, Any]] = []
+    steps = []
+    for k, sets in enumerate(scene.parts):
+        calls: list[tuple[str, str]] = []
+        for together in sets:
+            names = []
+            for part in together:
+                flows.append(_flow(system, k, part, f"flow_{len(flows)}"))
+                names.append(flows[-1]["name"])
+            *outer, inner = names
+            calls += [
+                *((name, "half") for name in outer),
+                (inner, "h"),
+                *((name, "half") for name in reversed(outer)),
+            ]
+        steps.append(calls)
+    return {
+        "exact": is_exact(scene.parts),
+        "rate": {"program": rate, "outputs": rate.outputs("rate", count)},
+        "forque": {"program": forque, "outputs": forque.outputs("forque", count)},
+        "flows": flows,
+        "steps": steps,
+    }
+
+
+def _flow(system: System, k: int, part: Part, name: str) -> dict[str, Any]:
+    """One part, for the template."""
+    program = motion(system, k, part)
+    text = ProgramText(rate_of(system, k, part) if program is None else program)
+    outputs = None
+    if program is not None:
+        outputs = {
+            kind: [cpp.expression_text(x) for n, x in program.outputs if n.startswith(f"{kind}.")]
+            for kind in ("motor", "momentum")
+        }
+    return {
+        "name": name,
+        "body": k,
+        "energy": energy_text(part),
+        "program": text,
+        "motor_is_read": f"m{k}" in text.used,
+        "outputs": outputs,
+    }
+
+
 def _recurrence(scene: GeneralScene, method: str | None, by_name: bool) -> str | None:
     """The recurrence for Taylor coefficients, for the method that needs it."""
     if method != "taylor":
@@ -207,7 +259,7 @@ def _lagrangian(lagrangian: Lagrangian, group_type: str, by_name: bool) -> dict[
     """The system of an L whose rates are found by Newton's method, for the template."""
     values = LagrangianSystem(lagrangian).template_values()
     text = rendered("lagrangian.cpp.jinja", group_type=group_type, by_name=by_name, **values)
-    return {"lagrangian": text}
+    return {"lagrangian": text, "parts": None}
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:

@@ -18,6 +18,8 @@ class Form(Flag):
     """Rigid bodies in which nothing acts; they are split as well."""
     GENERAL = auto()
     """Any H: its whole gradient."""
+    PARTS = auto()
+    """A kinetic energy in parts whose motion is known, and a potential, on any group."""
     MATRIX = auto()
     """Matrices in place of motors."""
 
@@ -51,6 +53,7 @@ class Method:
 ANY = Form.SPLIT | Form.GENERAL
 KEPT = Promise.MOMENTA | Promise.SYMMETRIC
 ALL = KEPT | Promise.SYMPLECTIC
+SPLITTABLE = Form.SPLIT | Form.PARTS
 AUTO = "auto"
 METHODS = (
     Method("rkmk4", 4, "Runge-Kutta-Munthe-Kaas, explicit", ANY | Form.MATRIX),
@@ -64,11 +67,11 @@ METHODS = (
     Method("rkmk87", 8, "the same by Prince & Dormand's pair", ANY, error_controlled=True),
     Method("cf4", 4, "commutator-free, explicit: two exponentials in place of brackets", ANY),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
-    Method("splitting2", 2, "Strang splitting, symplectic, keeps orbits", Form.SPLIT, ALL),
-    Method("splitting4", 4, "the same in 5 to 7 parts a step", Form.SPLIT, ALL),
-    Method("splitting6", 6, "the same in 9 to 15 parts a step", Form.SPLIT, ALL),
-    Method("splitting8", 8, "the same in 17 parts a step", Form.SPLIT, ALL),
-    Method("splitting10", 10, "the same in 35 parts a step, for the last digits", Form.SPLIT, ALL),
+    Method("splitting2", 2, "Strang splitting, symplectic, keeps orbits", SPLITTABLE, ALL),
+    Method("splitting4", 4, "the same in 5 to 7 parts a step", SPLITTABLE, ALL),
+    Method("splitting6", 6, "the same in 9 to 15 parts a step", SPLITTABLE, ALL),
+    Method("splitting8", 8, "the same in 17 parts a step", SPLITTABLE, ALL),
+    Method("splitting10", 10, "the same in 35 parts a step, for the last digits", SPLITTABLE, ALL),
     Method("moser_veselov2", 2, "discrete Moser-Veselov: RATTLE", Form.SPLIT, ALL),
     Method("moser_veselov4", 4, "the same with modified moments; Poisson", Form.FREE, KEPT),
     Method("moser_veselov6", 6, "the same, for free bodies only", Form.FREE, KEPT),

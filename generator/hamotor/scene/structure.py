@@ -12,7 +12,8 @@ STRUCTURES = {
     "several": "several rigid bodies in potentials",
     "symmetric": "a symmetric rigid body in potentials: its free motion is known",
     "asymmetric": "an asymmetric rigid body in potentials",
-    "general": "any Hamiltonian or Lagrangian",
+    "parts": "any group: a kinetic energy in parts whose motion is known, and a potential",
+    "general": "any other Hamiltonian or Lagrangian",
     "forced": "forques that no potential has",
     "rough": "energies or forques that are not smooth",
 }
@@ -33,6 +34,8 @@ def structure_of(scene: Scene | GeneralScene) -> str:
         return "symmetric" if len(set(moments)) < len(moments) else "asymmetric"
     if _is_rough(scene):
         return "rough"
+    if scene.form & Form.PARTS:
+        return "parts"
     return "forced" if scene.hamiltonian.applied else "general"
 
 

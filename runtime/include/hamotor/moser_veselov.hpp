@@ -243,7 +243,6 @@ class FreelyStepped {
   using Scalar = typename System::Scalar;
   static constexpr std::size_t bodies = System::bodies;
   static constexpr bool has_forque = System::has_forque;
-  static constexpr bool spin_apart = false;
   static constexpr bool takes_split_steps = !has_forque;
   using Motors = decltype(StateOf<System>::motors);
   using Momenta = decltype(StateOf<System>::momenta);

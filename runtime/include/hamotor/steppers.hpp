@@ -72,6 +72,13 @@ template <class Rate, class S>
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
 }
 
+/// Whether spins commute with everything else in a system and are left to the end of a step.
+template <class System>
+inline constexpr bool has_spin_apart = false;
+template <class System>
+  requires requires { System::spin_apart; }
+inline constexpr bool has_spin_apart<System> = System::spin_apart;
+
 /// Whether a system takes whole steps of a splitting by itself.
 template <class System>
 inline constexpr bool takes_split_steps = false;
@@ -91,10 +98,8 @@ template <class System, int order>
   if constexpr (order == 2 || (exact && !System::has_forque)) {
     return Composition<Strang>{};
   } else if constexpr (order == 4) {
-    if constexpr (free && System::nearly_symmetric) {
-      return Blanes864{};
-    } else if constexpr (free) {
-      return BlanesMoanFree4{};
+    if constexpr (free) {
+      return std::conditional_t<System::nearly_symmetric, Blanes864, BlanesMoanFree4>{};
     } else {
       return std::conditional_t<exact, BlanesMoan4, Composition<Suzuki4>>{};
     }
@@ -369,15 +374,19 @@ class Splitting {
           there.momenta[i] = state.momenta[i] + change.momenta[i];
         }
       };
-      const auto kick = [&](const S& weight) {
-        for (std::size_t i = 0; i < n; ++i) {
-          change.momenta[i] = mul_add(-weight * h, known_.forque[i], change.momenta[i]);
-          there.momenta[i] = state.momenta[i] + change.momenta[i];
+      [[maybe_unused]] const auto kick = [&](const S& weight) {
+        if constexpr (System::has_forque) {
+          for (std::size_t i = 0; i < n; ++i) {
+            change.momenta[i] = mul_add(-weight * h, known_.forque[i], change.momenta[i]);
+            there.momenta[i] = state.momenta[i] + change.momenta[i];
+          }
         }
       };
-      const auto find_forque = [&](const auto& motors) {
-        note_evaluations<S>(1);
-        known_.forque = system.forque(motors);
+      [[maybe_unused]] const auto find_forque = [&](const auto& motors) {
+        if constexpr (System::has_forque) {
+          note_evaluations<S>(1);
+          known_.forque = system.forque(motors);
+        }
       };
       if constexpr (opens_with_kick) {
         if (!is_known_at(state.motors)) find_forque(state.motors);
@@ -386,17 +395,21 @@ class Splitting {
       for (std::size_t k = 0; k < stages; ++k) {
         const bool last = k + 1 == stages;
         moves(system.free_change(there.motors, there.momenta, weights.drifts[k] * h));
-        if constexpr (System::spin_apart) {
+        if constexpr (detail::has_spin_apart<System>) {
           if (last) moves(system.spin_change(there.motors, there.momenta, h));
         }
-        if (opens_with_kick || !last) {
-          find_forque(there.motors);
-          kick(weights.kicks[k + 1]);
+        if constexpr (System::has_forque) {
+          if (opens_with_kick || !last) {
+            find_forque(there.motors);
+            kick(weights.kicks[k + 1]);
+          }
         }
       }
       add(state, change);
-      known_.any = opens_with_kick;
-      known_.at = state.motors;
+      if constexpr (System::has_forque) {
+        known_.any = opens_with_kick;
+        known_.at = state.motors;
+      }
     }
   }
 
@@ -417,7 +430,8 @@ class Splitting {
   static constexpr bool compensated = summation == Summation::compensated;
   static constexpr bool takes_whole_steps = detail::takes_split_steps<System>;
   static inline const auto weights = detail::rounded_weights<S, Scheme>();
-  static constexpr bool opens_with_kick = detail::rounded_weights<double, Scheme>().kicks[0] > 0;
+  static constexpr bool opens_with_kick =
+      System::has_forque && detail::rounded_weights<double, Scheme>().kicks[0] > 0;
 
   /// Packs are not compared: an ensemble changes no state between steps.
   [[nodiscard]] constexpr bool is_known_at(const Motors& motors) const noexcept {
