@@ -8,18 +8,18 @@ import pytest
 
 from hamotor.bench import bench_stability, stability
 from hamotor.errors import UsageError
-from hamotor.run.simulation import Simulation, load
+from hamotor.run.simulation import load
 from hamotor.scene import METHODS, Promise
 from hamotor.scene.methods import ALL
 
 
 @pytest.fixture(scope="module")
-def needle() -> Simulation:
-    return load(stability.CASES / "needle.toml")
+def needle() -> stability.Case:
+    return stability.hard_case("needle", ("rk4", "splitting2"))
 
 
 @pytest.fixture(scope="module")
-def reference(needle: Simulation) -> stability.Reference:
+def reference(needle: stability.Case) -> stability.Reference:
     return stability.reference_of(needle)
 
 
@@ -37,15 +37,24 @@ def test_an_unknown_case_is_an_error() -> None:
         bench_stability(["neddle"])
 
 
-def test_condition_and_reference(needle: Simulation, reference: stability.Reference) -> None:
+def test_condition_and_reference(needle: stability.Case, reference: stability.Reference) -> None:
     # A needle turns about its axis as its momentum there says, divided by a millionth.
     assert 1e5 < reference.condition < 1e8
     assert reference.agreement < 1e-10
-    pushed = stability.perturbed(needle, 1e-3, 1)
+    pushed = needle.state + stability.perturbation(needle, 1e-3, 1)
     assert 0 < stability.distance(pushed, needle.state, needle) <= 1e-3
 
 
-def test_a_splitting_passes(needle: Simulation, reference: stability.Reference) -> None:
+def test_numbers_are_compared_with_their_kind(needle: stability.Case) -> None:
+    # In the order of the columns: rotor and translation of the motor, then angular and linear.
+    far = needle.state.copy()
+    far[4:7] = 1e8
+    turned = far.copy()
+    turned[1] += 1e-3
+    assert stability.distance(turned, far, needle) == pytest.approx(1e-3)
+
+
+def test_a_splitting_passes(needle: stability.Case, reference: stability.Reference) -> None:
     row = stability.judged("needle", needle, reference, "splitting2")
     assert row.verdict == "pass", row.failures
     assert row.figures["momenta"] < 1e-14
@@ -53,7 +62,7 @@ def test_a_splitting_passes(needle: Simulation, reference: stability.Reference) 
 
 
 def test_a_promise_that_is_not_kept_fails(
-    needle: Simulation, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
+    needle: stability.Case, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert next(m for m in METHODS if m.name == "rk4").promises == Promise.NOTHING
     promising = tuple(replace(m, promises=ALL) for m in METHODS)
@@ -63,7 +72,17 @@ def test_a_promise_that_is_not_kept_fails(
     assert any("from the start" in failure for failure in row.failures)
 
 
-def test_a_wrong_order_fails(needle: Simulation, reference: stability.Reference) -> None:
+def test_a_step_that_is_too_long_is_divided(
+    needle: stability.Case, reference: stability.Reference
+) -> None:
+    row = stability.judged("needle", replace(needle, step=0.1), reference, "rk4")
+    assert row.verdict == "pass", row.failures
+    assert row.notes[0].startswith("step too long")
+    assert row.notes[-1].startswith("judged with a step of 0.")
+    assert row.figures["error"] < stability.UNRESOLVED
+
+
+def test_a_wrong_order_fails(needle: stability.Case, reference: stability.Reference) -> None:
     elsewhere = replace(reference, end=reference.end + 1e-3)
     row = stability.judged("needle", needle, elsewhere, "splitting2")
     assert row.verdict == "fail"
@@ -78,12 +97,13 @@ def test_exp_and_log_at_their_edges() -> None:
 
 
 def test_what_overflows_stops_and_what_is_denormal_is_refused() -> None:
-    assert stability.stop_of_an_overflow().passed
+    assert stability.stop_of("expanding").passed
     assert stability.refusal_of_a_denormal_mass().passed
 
 
 def test_table() -> None:
-    row = {"method": "rk4", "verdict": "fail", "figures": {"error": 0.5}, "failures": ["too far"]}
+    row = {"method": "rk4", "verdict": "fail", "figures": {"error": 0.5}}
+    row |= {"failures": ["too far"], "notes": ["judged with a step of 0.1 s"]}
     case = {
         "case": "needle",
         "description": "thin",
@@ -95,5 +115,5 @@ def test_table() -> None:
         "rows": [row, {**row, "verdict": "pass", "failures": []}],
     }
     text = stability.table({"cases": [case], "checks": []})
-    assert "    too far\n" in text
+    assert "    too far\n    judged with a step of 0.1 s\n" in text
     assert "2 judged: 1 pass, 0 unresolved" in text

@@ -3,19 +3,21 @@
 A case is a scene of `generator/scenes/hard`. Each method that the scene offers steps it twice, with
 the case's step h and with h/2; errors are distances at the end from a reference in a wider scalar,
 which two methods of high order agree upon. They are judged against the condition of the case, that
-is how much the end moves for a small change of the start, so that nobody is asked for digits that
-the initial state does not hold:
+is how much the end moves for a small change of the state, at the start or on the way, so that
+nobody is asked for digits that the state does not hold:
 
 * accuracy: the error of h/2 falls as the method's order says, or is at rounding × condition;
 * symplectic methods: spatial momenta and Casimirs at rounding; the energy error does not grow;
 * symmetric methods: forward and back again ends at the start;
 * a run in `float` is as good as its digits (one method of each family).
 
-Beside them: exp and log of every group around multiples of π, a run that must stop cleanly, and a
-mass that no scalar holds.
+Where h is too long for a method (it stops, or its error is beyond 0.1) it is judged at h/4 or h/16,
+and the row says so.  It stays `unresolved` where that is too long as well, or where rounding ×
+condition leaves no digit in a double: all that is asked then is that numbers stay finite and that
+what is promised for every step holds.
 
-A step too long for a method (an error beyond 0.1) is `unresolved`: all that is asked
-then is that numbers stay finite and that what is promised for every step holds.
+Beside them: exp and log of every group around multiples of π, runs that must stop cleanly, and a
+mass that no scalar holds.
 """
 
 from __future__ import annotations
@@ -28,9 +30,9 @@ import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
-from dataclasses import asdict, dataclass, field, replace
-from itertools import islice, pairwise
+from dataclasses import asdict, dataclass, field, fields, replace
+from fractions import Fraction
+from itertools import islice
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,10 +41,11 @@ import numpy as np
 from hamotor.bench.account import provenance, publish
 from hamotor.errors import NumericsError, UsageError, suggest
 from hamotor.run.build import compile_scene
-from hamotor.run.library import Vector
+from hamotor.run.library import SceneLibrary, Vector
 from hamotor.run.result import Run, RunFailed
-from hamotor.run.simulation import Simulation, load
+from hamotor.run.simulation import Compiled, Simulation, load
 from hamotor.scene import METHODS, Promise
+from hamotor.scene.methods import Method
 
 EDGES: Final = Path(__file__).resolve().parents[3] / "tests" / "bench" / "stability" / "edges.cpp"
 EDGE_BOUND: Final = 8.0
@@ -56,13 +59,48 @@ FINER: Final = (4, 8, 16)
 """How many times shorter a reference's steps are, until both methods agree."""
 AGREED: Final = 1e-15
 ROWS: Final = 1000
-PERTURBATION: Final = 1e-9
-ROUNDINGS: Final = 64.0
+SHORTER: Final = (1, 4, 16)
+"""Parts of the case's step that a method is tried with, until it resolves the case."""
+PERTURBATION: Final = 1e-15
+PERTURBED_AT: Final = (0.0, 0.25, 0.5, 0.75, 0.98)
+"""Parts of the way at which the state is moved, for the condition."""
+ROUNDINGS: Final = 16.0
 """Roundings of a step that the condition may multiply."""
 UNRESOLVED: Final = 0.1
 GROWTH: Final = 3.0
 ORDER_SLACK: Final = 0.7
 EPSILON: Final = {"double": 2.0**-52, "float": 2.0**-23}
+
+
+@dataclass(frozen=True)
+class Case(Simulation):
+    """A hard case.  One library a scalar holds all the methods that it is run with."""
+
+    by_scalar: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    compiled: dict[str, Compiled] = field(default_factory=dict)
+
+    def compile(self, *, scalar: str = "double", **_: Any) -> Compiled:
+        """The library of a scalar; for those beside double in half the compiler's time."""
+        if scalar not in self.compiled:
+            names = " ".join(self.by_scalar[scalar])
+            text = self.source("generated", scalar, "taylor")
+            text = f'#define HAMOTOR_METHOD "{names}"\n{text}'
+            flags = () if scalar == "double" else ("-O1",)
+            build = compile_scene(text, scalar=scalar, extra_flags=flags)
+            self.compiled[scalar] = Compiled(build, SceneLibrary(build.library), 0.0, text)
+        return self.compiled[scalar]
+
+
+def hard_case(name: str, methods: Sequence[str] = ()) -> Case:
+    """The hard case of this name, to be run with these methods (all that it offers)."""
+    scene = load(CASES / f"{name}.toml")
+    wanted = tuple(m for m in scene.methods if not methods or m in methods)
+    by_scalar = {
+        "double": wanted,
+        "float": tuple(m for m in wanted if m in QUICK),
+        WIDE: tuple(m for m in REFERENCES if m in scene.methods),
+    }
+    return Case(**{f.name: getattr(scene, f.name) for f in fields(scene)}, by_scalar=by_scalar)
 
 
 @dataclass(frozen=True)
@@ -74,9 +112,11 @@ class Row:
     order: int
     figures: dict[str, float]
     verdict: str
-    """`pass`, `unresolved` (finite, and what holds for any step held), `stops` (cleanly; a quarter
-    of the step gets through) or `fail`."""
+    """`pass`, `unresolved` (finite, and what holds for any step held), `stops` (cleanly, where no
+    digit would be left) or `fail`."""
     failures: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    """At which step it was judged and why, if not at the case's; why it is unresolved."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +128,7 @@ class Reference:
     agreement: float
     """Distance of two methods' ends."""
     condition: float
-    """How many times further apart two runs end than they start, or than they are half-way."""
+    """How many times further apart two runs end than they are at the start, or on the way."""
 
 
 def bench_stability(
@@ -106,30 +146,13 @@ def bench_stability(
             raise UsageError(
                 f'no hard case "{case}"; there are {", ".join(known)}.{suggest(case, known)}'
             )
-    told: list[dict[str, Any]] = []
     checks: list[Check] = []
     if not cases:
         print("judging exp, log, stops and refusals", file=sys.stderr, flush=True)
-        checks = [*edges(), stop_of_an_overflow(), refusal_of_a_denormal_mass()]
-    for case in cases or known:
-        print(f"judging {case}", file=sys.stderr, flush=True)
-        simulation = load(CASES / f"{case}.toml")
-        methods = [m for m in simulation.methods if not quick or m in QUICK]
-        _compile(simulation, methods)
-        reference = reference_of(simulation)
-        rows = [judged(case, simulation, reference, method) for method in methods]
-        told.append(
-            {
-                "case": case,
-                "description": _description(simulation),
-                "step": simulation.step,
-                "end": simulation.end,
-                "reference": reference.method,
-                "reference_agreement": reference.agreement,
-                "condition": reference.condition,
-                "rows": [asdict(row) for row in rows],
-            }
-        )
+        stops = (stop_of("expanding"), stop_of("shrinking"))
+        checks = [*edges(), *stops, refusal_of_a_denormal_mass()]
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        told = list(pool.map(lambda case: _judged_case(case, quick=quick), cases or known))
     account = {
         "benchmark": "stability",
         "quick": quick,
@@ -148,18 +171,21 @@ def bench_stability(
     return account
 
 
-def _compile(simulation: Simulation, methods: Sequence[str]) -> None:
-    """All that a case needs, on all cores; runs find it in the cache."""
-    wanted = {(method, "double") for method in methods}
-    wanted |= {(method, "float") for method in methods if method in QUICK}
-    wanted |= {(method, WIDE) for method in REFERENCES if method in simulation.methods}
-
-    def compiled(what: tuple[str, str]) -> None:
-        with suppress(UsageError):  # a number that the scalar does not hold
-            simulation.compile(method=what[0], scalar=what[1])
-
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        list(pool.map(compiled, sorted(wanted)))
+def _judged_case(name: str, *, quick: bool) -> dict[str, Any]:
+    print(f"judging {name}", file=sys.stderr, flush=True)
+    case = hard_case(name, QUICK if quick else ())
+    reference = reference_of(case)
+    rows = [judged(name, case, reference, method) for method in case.by_scalar["double"]]
+    return {
+        "case": name,
+        "description": _description(case),
+        "step": case.step,
+        "end": case.end,
+        "reference": reference.method,
+        "reference_agreement": reference.agreement,
+        "condition": reference.condition,
+        "rows": [asdict(row) for row in rows],
+    }
 
 
 def case_names() -> list[str]:
@@ -194,16 +220,16 @@ def edges() -> list[Check]:
     ]
 
 
-def stop_of_an_overflow() -> Check:
-    """A body that expands by e³ a second, until its numbers overflow."""
-    expanding = load(CASES / "expanding.toml")
+def stop_of(name: str) -> Check:
+    """A body that expands, or shrinks, for ever: until the digits of a motor do not hold it."""
+    check = f"stop of a body that is {name}"
     try:
-        run = expanding.run(end=1e4, step=0.01, method="rkmk4", every=1000)
+        run = hard_case(name, ("rkmk4",)).run(end=1e4, step=0.01, method="rkmk4", every=1000)
     except RunFailed as failed:
         message, kept = str(failed), failed.run.t[-1]
         told = "left the group" in message and "step" in message and "blob." in message
-        return Check("stop of an overflow", told and bool(kept > 0), f"kept {kept:g} s: {message}")
-    return Check("stop of an overflow", False, f"went on to t = {run.t[-1]:g} s")
+        return Check(check, told and bool(kept > 0), f"kept {kept:g} s: {message}")
+    return Check(check, False, f"went on to t = {run.t[-1]:g} s")
 
 
 def refusal_of_a_denormal_mass() -> Check:
@@ -244,20 +270,26 @@ def reference_of(simulation: Simulation) -> Reference:
         if agreement < AGREED:
             break
     agreement, finer, end = min(tried, key=lambda found: found[0])
-    half = replace(simulation, end=simulation.end / 2)
-    middle = end_of(half, methods[0], finer)
     condition = 1.0
-    for start, to in ((simulation, end), (started(half, middle), None)):
-        there = end_of(start, methods[0], finer) if to is None else to
+    for part in PERTURBED_AT:
+        state = simulation.state
+        if part > 0:
+            state = end_of(replace(simulation, end=part * simulation.end), methods[0], finer)
+        rest = replace(started(simulation, state), end=(1 - part) * simulation.end)
+        there = end_of(rest, methods[0], finer)
         for seed in (1, 2):
-            moved = end_of(started(start, perturbed(start, PERTURBATION, seed)), methods[0], finer)
+            change = perturbation(rest, PERTURBATION, seed)
+            moved = end_of(started(rest, rest.state, change), methods[0], finer)
             condition = max(condition, distance(moved, there, simulation) / PERTURBATION)
     return Reference(end, " and ".join(methods), agreement, condition)
 
 
-def started(simulation: Simulation, state: Vector) -> Simulation:
-    """The same scene from another state."""
-    return replace(simulation, state=state, exact_digits=())
+def started(simulation: Simulation, state: Vector, change: Vector | None = None) -> Simulation:
+    """The same scene from another state, and a change of it that a double may not hold."""
+    if change is None:
+        return replace(simulation, state=state, exact_digits=())
+    exact = [Fraction(x) + Fraction(dx) for x, dx in zip(state, change, strict=True)]
+    return replace(simulation, state=state + change, exact_digits=tuple(map(str, exact)))
 
 
 def _survives(simulation: Simulation, method: str, scalar: str = WIDE) -> bool:
@@ -268,27 +300,35 @@ def _survives(simulation: Simulation, method: str, scalar: str = WIDE) -> bool:
     return True
 
 
-def perturbed(simulation: Simulation, size: float, seed: int) -> Vector:
-    """The initial state with every number changed by up to `size` of the largest of its kind."""
+def perturbation(simulation: Simulation, size: float, seed: int) -> Vector:
+    """A change of every number of the initial state by up to `size` of the largest of its kind."""
     random = np.random.default_rng(seed)
-    state = simulation.state.copy()
-    for part in _parts(simulation, state):
-        part[:] += size * np.abs(part).max() * random.uniform(-1, 1, len(part))
-    return state
+    change = np.zeros_like(simulation.state)
+    for kind in _kinds(simulation):
+        largest = np.abs(simulation.state[kind]).max()
+        change[kind] = size * largest * random.uniform(-1, 1, len(kind))
+    return change
 
 
-def _parts(simulation: Simulation, state: Vector) -> list[Vector]:
-    """Views of the motor and the momentum of each body."""
-    run = simulation.compile(method=next(iter(simulation.methods))).description
-    motor, momentum = len(run.motor), len(run.momentum)
-    ends = np.cumsum([0, *([motor, momentum] * len(run.bodies))])
-    return [state[a:b] for a, b in pairwise(ends)]
+def _kinds(simulation: Simulation) -> list[list[int]]:
+    """Which numbers of a state are alike: of one body, motor or momentum, in one unit."""
+    found = simulation.compile(method=next(iter(simulation.methods))).description
+    columns = [found.columns[k] for k in found.state_columns()]
+    kinds: dict[tuple[str, str, str], list[int]] = {}
+    for index, column in enumerate(columns):
+        part = column.name.removeprefix(f"{column.body}.").partition(".")[0]
+        kinds.setdefault((column.body, part, column.unit), []).append(index)
+    return list(kinds.values())
 
 
-def distance(one: Vector, other: Vector, simulation: Simulation) -> float:
-    """The largest difference of a motor's or a momentum's number, relative to the largest of it."""
-    pairs = zip(_parts(simulation, one), _parts(simulation, other), strict=True)
-    return max(float(np.abs(a - b).max() / max(np.abs(b).max(), 1e-300)) for a, b in pairs)
+def distance(one: Vector, other: Vector, simulation: Simulation, *also: Vector) -> float:
+    """The largest difference of two numbers, relative to the largest of their kind.
+
+    That is the largest in `other`, or in `also`: other states that the scene goes through.
+    """
+    off, sizes = np.abs(one - other), np.max(np.abs([other, *also]), axis=0)
+    kinds = _kinds(simulation)
+    return max(float(off[kind].max() / max(sizes[kind].max(), 1e-300)) for kind in kinds)
 
 
 def end_state(run: Run) -> Vector:
@@ -304,28 +344,64 @@ def end_state(run: Run) -> Vector:
 
 
 def judged(case: str, simulation: Simulation, reference: Reference, method: str) -> Row:
-    """One method on one case."""
+    """One method on one case, with the first of the steps h, h/4 and h/16 that resolves it."""
     traits = next(m for m in METHODS if m.name == method)
+    notes: list[str] = []
+    for shorter in SHORTER:
+        assert simulation.step is not None
+        finer = replace(simulation, step=simulation.step / shorter)
+        of_step = f" of {finer.step:g} s" if shorter > 1 else ""
+        steps = round(simulation.end / simulation.step) * shorter
+        floor = _floor(reference, steps, "double")
+        try:
+            coarse = _run(finer, method, 1, watched=True)
+            fine = _run(finer, method, 2)
+        except RunFailed as failed:
+            notes.append(f"step{of_step}: {failed}")
+            continue
+        error = distance(end_state(coarse), reference.end, simulation)
+        last = shorter == SHORTER[-1]
+        resolved = error <= UNRESOLVED or traits.order == 0 or not math.isfinite(error)
+        if resolved or last or floor > UNRESOLVED:
+            if floor > UNRESOLVED:
+                notes.append(f"rounding × condition is {floor:.0e}: no digit is left to judge")
+            elif not resolved:
+                notes.append(f"error {error:.1e} even with a step of {finer.step:g} s")
+            elif shorter > 1:
+                notes.append(f"judged with a step of {finer.step:g} s")
+            return _judged_at(case, finer, reference, traits, (coarse, fine), notes)
+        notes.append(f"step{of_step} too long: error {error:.1e}")
+    verdict = "stops" if floor > UNRESOLVED else "fail"
+    return Row(case, method, traits.order, {"rounding": floor}, verdict, notes)
+
+
+def _floor(reference: Reference, steps: int, scalar: str) -> float:
+    """What rounding in every step may leave at the end."""
+    rounding = ROUNDINGS * EPSILON[scalar] * math.sqrt(steps)
+    return rounding * reference.condition + 2 * reference.agreement
+
+
+def _judged_at(
+    case: str,
+    simulation: Simulation,
+    reference: Reference,
+    traits: Method,
+    runs: tuple[Run, Run],
+    notes: list[str],
+) -> Row:
+    """The verdict at a step, from the runs with it and with half of it."""
+    coarse, method = runs[0], traits.name
     figures: dict[str, float] = {}
     failures: list[str] = []
-    verdict = "pass"
-    try:
-        coarse = _run(simulation, method, 1, watched=True)
-        fine = _run(simulation, method, 2)
-    except RunFailed as failed:
-        stops = "stops" if _survives(simulation, method, "double") else "fail"
-        return Row(case, method, traits.order, figures, stops, [str(failed)])
     steps = int(coarse.report["steps"])
-    floor = (
-        ROUNDINGS * EPSILON["double"] * math.sqrt(steps) * reference.condition
-        + 2 * reference.agreement
-    )
-    error, finer = (distance(end_state(run), reference.end, simulation) for run in (coarse, fine))
+    floor = _floor(reference, steps, "double")
+    error, finer = (distance(end_state(run), reference.end, simulation) for run in runs)
     figures |= {"error": error, "error at half the step": finer, "rounding": floor}
     if not math.isfinite(error + finer):
         failures.append("a number is not finite")
     exact = traits.order == 0
-    if error > UNRESOLVED and not exact:
+    verdict = "pass"
+    if floor > UNRESOLVED or (error > UNRESOLVED and not exact):
         verdict = "unresolved"
     elif finer > max(0.0 if exact else error / 2 ** (traits.order - ORDER_SLACK), floor):
         failures.append(f"error {error:.1e} falls to {finer:.1e} only, rounding being {floor:.1e}")
@@ -349,9 +425,11 @@ def judged(case: str, simulation: Simulation, reference: Reference, method: str)
         if verdict != "unresolved" and back > floor:
             failures.append(f"returns {back:.1e} from the start")
     if verdict != "unresolved" and method in QUICK:
-        figures["float"], wrong = _in_float(simulation, reference, method, error, floor)
+        figures["float"], wrong = _in_float(simulation, reference, method, error)
         failures += wrong
-    return Row(case, method, traits.order, figures, "fail" if failures else verdict, failures)
+    return Row(
+        case, method, traits.order, figures, "fail" if failures else verdict, failures, notes
+    )
 
 
 def reversal(simulation: Simulation, method: str, end: Vector, steps: int) -> float:
@@ -361,11 +439,11 @@ def reversal(simulation: Simulation, method: str, end: Vector, steps: int) -> fl
     with library.start(method, step=-simulation.end / steps, state=end) as run:
         if run.advance(steps, 0, None) < steps:
             return math.inf
-        return distance(run.state(), simulation.state, simulation)
+        return distance(run.state(), simulation.state, simulation, end)
 
 
 def _in_float(
-    simulation: Simulation, reference: Reference, method: str, error: float, floor: float
+    simulation: Simulation, reference: Reference, method: str, error: float
 ) -> tuple[float, list[str]]:
     try:
         run = _run(simulation, method, 1, scalar="float")
@@ -373,11 +451,11 @@ def _in_float(
         return math.nan, []  # refused by name
     except RunFailed:
         # A clean stop, where float has too few digits to go on.
-        digits = EPSILON["float"] / EPSILON["double"] * floor
-        return math.nan, [] if digits > UNRESOLVED else ["float: stops"]
+        assert simulation.step is not None
+        floor = _floor(reference, round(simulation.end / simulation.step), "float")
+        return math.nan, [] if floor > UNRESOLVED else ["float: stops"]
     found = distance(end_state(run), reference.end, simulation)
-    steps = int(run.report["steps"])
-    bound = ROUNDINGS * EPSILON["float"] * math.sqrt(steps) * reference.condition + 2 * error
+    bound = _floor(reference, int(run.report["steps"]), "float") + 2 * error
     wrong = [f"float: error {found:.1e}, more than {bound:.1e}"]
     return found, wrong if not found <= bound else []
 
@@ -446,7 +524,7 @@ def table(account: Mapping[str, Any]) -> str:
                 for name in COLUMNS
             )
             lines.append(f"  {row['method']:<14}{cells}  {row['verdict']}")
-            lines += [f"    {failure}" for failure in row["failures"]]
+            lines += [f"    {line}" for line in [*row["failures"], *row["notes"]]]
         lines.append("")
     for check in account["checks"]:
         lines.append(f"{check['name']}: {check['found']}: {'pass' if check['passed'] else 'fail'}")
@@ -455,8 +533,8 @@ def table(account: Mapping[str, Any]) -> str:
     rows = [row for case in account["cases"] for row in case["rows"]]
     count = Counter(row["verdict"] for row in rows)
     lines.append(
-        f"{len(rows)} judged: {count['pass']} pass, {count['unresolved']} unresolved (step too long"
-        f" for the method; finite, momenta kept where promised), {count['stops']} stop cleanly,"
+        f"{len(rows)} judged: {count['pass']} pass, {count['unresolved']} unresolved (no digit to"
+        f" judge; finite, momenta kept where promised), {count['stops']} stop cleanly,"
         f" {count['fail']} fail"
     )
     return "\n".join(lines)

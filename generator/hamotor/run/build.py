@@ -297,13 +297,15 @@ def compile_scene(
     libraries: Sequence[Path] = (),
     links: Sequence[str] = (),
     scalar: str = "double",
+    extra_flags: Sequence[str] = (),
     cache: Path | None = None,
     on_compile: Callable[[], None] = lambda: None,
 ) -> CompiledScene:
     """Compile the C++ text of a scene to a shared library, or find it compiled already.
 
     `libraries` are folders of headers that others maintain: a version is what distinguishes them.
-    `links` are options that name what to link with.  `scalar` is what the scene calculates with.
+    `links` are options that name what to link with, `extra_flags` come after the usual ones.
+    `scalar` is what the scene calculates with.
 
     `on_compile` is called before the compiler starts, and not where it need not.
 
@@ -314,7 +316,7 @@ def compile_scene(
     cache = default_cache() if cache is None else cache
     requirement = requirement_of(scalar, platform.machine())
     compiler = find_compiler(cache, requirement)
-    flags = flags_for(platform.machine())
+    flags = (*flags_for(platform.machine()), *extra_flags)
     links = (*links, *(() if requirement is None else requirement.links))
     key = hashlib.sha256(
         json.dumps(

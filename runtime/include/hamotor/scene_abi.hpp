@@ -314,15 +314,23 @@ template <class Scene>
   return list.text();
 }
 
-/// The one method that a library is compiled with, a define before this header; all if there is
-/// none.
+/// The methods that a library is compiled with, a define before this header of names one space
+/// apart; all if there is none.
 #ifndef HAMOTOR_METHOD
 #define HAMOTOR_METHOD ""
 #endif
-inline constexpr std::string_view compiled_method = HAMOTOR_METHOD;
+[[nodiscard]] constexpr bool is_listed(std::string_view names, std::string_view name) noexcept {
+  for (std::size_t at = names.find(name); at != names.npos; at = names.find(name, at + 1)) {
+    const std::size_t end = at + name.size();
+    const bool starts = at == 0 || names[at - 1] == ' ';
+    if (starts && (end == names.size() || names[end] == ' ')) return true;
+  }
+  return false;
+}
 
 template <class Method>
-inline constexpr bool is_compiled = compiled_method.empty() || compiled_method == Method::name;
+inline constexpr bool is_compiled =
+    std::string_view(HAMOTOR_METHOD).empty() || is_listed(HAMOTOR_METHOD, Method::name);
 
 template <class Methods, class S>
 struct MethodTable;
