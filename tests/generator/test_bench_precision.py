@@ -105,7 +105,9 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
         live.advance(4000, 0, None)
         end = endpoint.of_row(library.description, live.observe())
     vars(one)["reference"] = Reference(end, "splitting8", "none")  # one in quad takes a minute
-    extent = Extent(2, 2.0, 0.001, 0.01, forms=False, compilers=("g++",), drift=20_000)
+    extent = Extent(
+        2, 2.0, 0.001, 0.01, forms=False, compilers=("g++",), drift=20_000, counted=True
+    )
     account = measure([one], extent, {}, {})
     assert "space" in account["not_there"]["public solvers on planar"]
     for method in simulation.methods:
@@ -115,6 +117,13 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
         errors = [row["errors"][POSITION] for row in rows if row["failure"] is None]
         assert min(errors) < 1e-3 * max(errors)
         assert all(0 < row["best_us"] <= row["median_us"] <= row["worst_us"] for row in rows)
+        assert all(row["cpu_us"] < 1e6 for row in rows)
+        finest = rows[-1]
+        assert 16 <= finest["evaluations"] / finest["steps"] <= 18
+        assert finest["operations"] / finest["steps"] > 17 * finest["per_step"]["roots"]
+        assert finest["operations"] == pytest.approx(
+            finest["steps"] * sum(finest["per_step"].values()), rel=1e-6
+        )
     (energy,) = (row for row in account["drift"] if row["quantity"] == "energy")
     assert energy["steps"] == 20_000
     assert 0 < energy["largest"] < 1e-10
