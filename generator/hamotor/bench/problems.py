@@ -19,7 +19,6 @@ from hamotor.bench import endpoint
 from hamotor.bench.endpoint import ATTITUDE, POSITION, Endpoint
 from hamotor.errors import HamotorError, UsageError
 from hamotor.run.build import default_cache, default_includes, headers_digest
-from hamotor.run.library import SceneLibrary
 from hamotor.run.simulation import Simulation, load
 from hamotor.scene import Scene, find_scene
 
@@ -38,8 +37,13 @@ GOALS: Final[Mapping[str, tuple[float | None, ...]]] = {
 """How many times faster than the best public solver to be at each of `TARGETS`, as prototypes were;
 None where no public solver gets there."""
 
-_WITNESSES: Final = (("mpfr50", 1e-36), ("quad", 1e-30))
-"""Two scalars, and the tolerances, s⁻¹, with which Taylor's method computes a reference in them."""
+_WITNESSES: Final = (
+    ("taylor", "mpfr50", 1e-36),
+    ("taylor", "quad", 1e-30),
+    ("rkmk87", "quad", 1e-20),
+)
+"""Methods, scalars and tolerances, s⁻¹: the first computes a reference, the second holds its
+rounding to account, the third, which has nothing in common with them, its formulas."""
 _LARGEST_DOUBT: Final = 1e-12
 
 
@@ -156,45 +160,50 @@ def _from_digits(file: Path, scene: Scene) -> Reference:
 
 
 def _computed(simulation: Simulation) -> Reference:
-    """In two precisions, kept; raises UsageError where they do not agree to 1e-12."""
-    runs = [f"Taylor series in {scalar}, tolerance {error:g}" for scalar, error in _WITNESSES]
+    """In two precisions and by two methods, kept; UsageError where they do not agree to 1e-12."""
+    runs = [f"{method} in {scalar}, tolerance {error:g}" for method, scalar, error in _WITNESSES]
     key = json.dumps(
         [simulation.spec_hash, simulation.end, runs, headers_digest(default_includes())]
     )
     file = default_cache() / "references" / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
     kept = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
-    first, second = (simulation.compile(scalar=s, method="taylor") for s, _ in _WITNESSES)
+    first = simulation.compile(scalar=_WITNESSES[0][1], method=_WITNESSES[0][0])
     if not kept:
-        ends = [
-            _end_of_taylor(simulation, compiled.library, tolerance)
-            for compiled, (_, tolerance) in zip((first, second), _WITNESSES, strict=True)
-        ]
+        row, *others = (
+            _end_of(simulation, method, scalar, error) for method, scalar, error in _WITNESSES
+        )
         columns = first.description.state_columns()
-        apart = max(abs(Fraction(ends[0][c]) - Fraction(ends[1][c])) for c in columns)
-        kept = {"row": ends[0], "apart": float(apart)}
+        apart = [
+            float(max(abs(Fraction(row[c]) - Fraction(other[c])) for c in columns))
+            for other in others
+        ]
+        kept = {"row": row, "apart": apart}
         file.parent.mkdir(parents=True, exist_ok=True)
         unfinished = file.with_name(f".{os.getpid()}-{file.name}")
         unfinished.write_text(json.dumps(kept), encoding="utf-8")
         unfinished.replace(file)
     rows, apart = kept["row"], kept["apart"]
-    if not apart < _LARGEST_DOUBT:
-        raise UsageError(
-            f"{simulation.name}: {runs[0]} and {runs[1]} end {apart:.1e} apart, so that there is"
-            " no reference. The motion is chaotic or not smooth: end it earlier."
-        )
+    for run, distance in zip(runs[1:], apart, strict=True):
+        if not distance < _LARGEST_DOUBT:
+            raise UsageError(
+                f"{simulation.name}: {runs[0]} and {run} end {distance:.1e} apart, so that there is"
+                " no reference. The motion is chaotic or not smooth: end it earlier."
+            )
     return Reference(
         endpoint.of_row(first.description, [np.longdouble(x) for x in rows]),
         runs[0],
-        f"{runs[1]}: no number of the state differs by more than {apart:.1e}",
+        "no number of the state differs by more than "
+        + ", ".join(f"{d:.1e} ({run})" for run, d in zip(runs[1:], apart, strict=True)),
     )
 
 
-def _end_of_taylor(simulation: Simulation, library: SceneLibrary, tolerance: float) -> list[str]:
+def _end_of(simulation: Simulation, method: str, scalar: str, tolerance: float) -> list[str]:
     """The row at the end, in decimals with all digits."""
+    library = simulation.compile(scalar=scalar, method=method).library
     parts = 16  # an answer to Ctrl-C now and then
     step = Fraction(simulation.end) / parts
     with library.start(
-        "taylor", step=step, state=simulation.exact_state, tolerance=tolerance
+        method, step=step, state=simulation.exact_state, tolerance=tolerance
     ) as live:
         if any(live.advance(1, 0, None) < 1 for _ in range(parts)):
             raise UsageError(f"{simulation.name}: no reference: {live.failure()[0].name}")
