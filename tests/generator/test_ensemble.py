@@ -25,6 +25,7 @@ from hamotor.run.ensemble import CHUNK, PART, Job, Part
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
 from hamotor.run.library import SceneLibrary
 from hamotor.run.sampling import starts
+from hamotor.run.simulation import Simulation
 from hamotor.run.statistics import Moments
 from hamotor.scene import parse_scene
 from hamotor.scene.model import Scene
@@ -85,7 +86,7 @@ def scene_of(draws: str, values: Mapping[str, str] = SPATIAL) -> Scene:
 
 
 def drawn(scene: Any, members: int, first: int = 0) -> NDArray[np.float64]:
-    return starts(scene.ensemble, scene.initial_state, 1, first, members)
+    return starts(scene.ensemble, scene.initial_state, 1, first, members)[0]
 
 
 def test_members_start_at_the_values_that_are_listed() -> None:
@@ -359,18 +360,103 @@ def test_scenes_that_draw_nothing_are_refused() -> None:
         run_ensemble("tumbling_debris", 10, method="rkmk44")
 
 
-def test_the_bundled_ensemble_steps_like_single_runs() -> None:
-    simulation = hamotor.load("tumbling_debris")
-    members = 19
-    run = run_ensemble(simulation, members, end=0.4, every=10, keep=[4])
-    compiled = simulation.compile(method="splitting4", ensembles=True)
-    states = starts(simulation.ensemble, simulation.state, 1, 0, members)
+BOUNCE = """
+algebra = "pga3"
+[[body]]
+name = "a"
+mass = 2.0
+inertia = [1.0, 2.0, 2.5]
+position = [0.3, 0, 1]
+angular_velocity = [0.1, 2, 0.3]
+[[interaction]]
+type = "gravity"
+acceleration = [0, 0, -9.0]
+[[interaction]]
+type = "spring"
+body = "a"
+anchor = [0, 0, 0]
+stiffness = 50.0
+[time]
+end = 1.0
+step = 0.005
+method = "rk4"
+[output]
+every = 100
+[[ensemble.parameter]]
+name = "stiffness"
+interaction = 2
+distribution = { low = 20, high = 80 }
+[[ensemble.parameter]]
+name = "acceleration_z"
+interaction = 1
+distribution = { values = [-9.0, -1.62, 0] }
+"""
+
+
+@pytest.fixture(scope="module")
+def bounce(tmp_path_factory: pytest.TempPathFactory) -> Simulation:
+    """A body on a spring of its own stiffness, in a gravity of its own."""
+    path = tmp_path_factory.mktemp("scenes") / "bounce.toml"
+    path.write_text(BOUNCE)
+    return hamotor.load(path)
+
+
+def test_members_have_parameters_of_their_own(bounce: Simulation) -> None:
+    members = 21
+    run = run_ensemble(bounce, members, keep=range(members), seed=4)
+    _, parameters = starts(bounce.ensemble, bounce.state, 4, 0, members)
+    stiffness, field = parameters.T
+    assert 20 < stiffness.min() < 35
+    assert 65 < stiffness.max() < 80
+    assert field[:4].tolist() == [-9.0, -1.62, 0.0, -9.0]
+    rest = 2.0 * field / stiffness
     for member in range(members):
-        with compiled.library.start("splitting4", step=0.02, state=states[member]) as live:
+        found = run.trajectory(member)
+        swing = np.cos(np.sqrt(stiffness[member] / 2.0) * found["t"])
+        height = rest[member] + (1.0 - rest[member]) * swing
+        np.testing.assert_allclose(found["a.position.z"], height, atol=1e-6)
+        np.testing.assert_allclose(found["a.position.x"], 0.3 * swing, atol=1e-6)
+        turning = (0.01 + 8.0 + 0.225) / 2
+        energy = turning + stiffness[member] * 1.09 / 2 - 2.0 * field[member]
+        np.testing.assert_allclose(found["energy"], energy, rtol=1e-7)
+    alone = run_ensemble(bounce, members, member=13, seed=4)
+    assert (alone.states[0] == run.states[13]).all()
+
+
+def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:
+    states = np.tile(bounce.state, (19, 1))
+    states[:, 8:] += np.linspace(-1, 1, 19)[:, np.newaxis]
+    run = run_ensemble(bounce, states=states, end=0.1)
+    library = bounce.compile(method="rk4", ensembles=True).library
+    for member in range(19):
+        with library.start("rk4", step=0.005, state=states[member]) as live:
             live.advance(20, 0, None)
             assert (live.state() == run.states[member]).all()
-    assert max(q["max_relative_error"] for q in run.report["conserved"].values()) < 1e-4
-    assert "19 members, seed 1, 20 steps of 0.02 s" in run.summary()
+    assert "19 members, given states, 20 steps of 0.005 s" in run.summary()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('name = "stifness"', 'interaction 2 has no parameter "stifness".*Did you mean "stiff'),
+        ('name = "mass"', r'the energy has no parameter "mass"; it has none'),
+        ('interaction = 3\nname = "k"', r'interaction 3 has no parameter "k"; it has none'),
+        ('name = "stiffness"\ninteraction = 2', '"2.stiffness" is drawn already'),
+    ],
+)
+def test_parameters_that_there_are_not_are_refused(text: str, message: str) -> None:
+    draws = f"[[ensemble.parameter]]\n{text}\ndistribution = {{ sd = 1 }}\n"
+    if "stifness" in text:
+        draws = draws.replace(text, f"{text}\ninteraction = 2")
+    with pytest.raises(UsageError, match=message):
+        parse_scene((BOUNCE + draws).encode(), name="s", file="s.toml")
+
+
+def test_what_cannot_have_drawn_parameters_is_refused(bounce: Simulation) -> None:
+    with pytest.raises(UsageError, match=r"2.stiffness, 1.acceleration_z cannot be drawn: taylor"):
+        run_ensemble(bounce, 3, method="taylor")
+    with pytest.raises(UsageError, match=r"unknown method .closed_form."):
+        run_ensemble(bounce, 3, method="closed_form")
 
 
 # ---------------------------------------------------------------- other processes

@@ -25,11 +25,14 @@ class System:
     """
 
     hamiltonian: Hamiltonian
+    drawn: tuple[Expr, ...] = ()
+    """Parameters that stay variables, `parameters[0]` and so on."""
 
     @cached_property
     def names(self) -> dict[Expr, str]:
         """What comes from outside."""
         names = {TIME: "t"}
+        names |= {symbol: f"parameters[{k}]" for k, symbol in enumerate(self.drawn)}
         for k, body in enumerate(self.hamiltonian.bodies):
             components = body.group.element.components
             names |= {s: f"m{k}.{c.name}" for s, c in zip(body.motor, components, strict=True)}
@@ -68,7 +71,7 @@ class System:
     def _program(
         self, outputs: Mapping[str, Expr], between: list[Definition] | None = None
     ) -> Program:
-        values = self.hamiltonian.parameters
+        values = {s: x for s, x in self.hamiltonian.parameters.items() if s not in self.drawn}
         known = {name: folded(x, values) for name, x in outputs.items()}
         stages = [*self.places, *(between or [])]
         definitions = [(s, name, folded(x, values)) for s, name, x in stages]

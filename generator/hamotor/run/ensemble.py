@@ -76,12 +76,13 @@ class Job:
         first = part * PART
         return self.first + first, min(PART, self.members - first)
 
-    def starts(self, first: int, members: int) -> Rows:
-        """The states at which these members start."""
+    def starts(self, first: int, members: int) -> tuple[Rows, Rows | None]:
+        """The states at which these members start, and their parameters: None for the scene's."""
         if self.given is not None:
             begin = first - self.first
-            return self.given[begin : begin + members]
-        return starts(self.ensemble, np.array(self.own), self.seed, first, members)
+            return self.given[begin : begin + members], None
+        found = starts(self.ensemble, np.array(self.own), self.seed, first, members)
+        return found if self.ensemble.parameters else (found[0], None)
 
     def sampled(self, columns: int) -> int:
         """How many members, from the first, the quantiles are of."""
@@ -242,12 +243,19 @@ def refuse_impossible(library: SceneLibrary, job: Job) -> None:
             f"statistics of {columns} columns at {len(job.recorded):,} times are too many; record "
             f"at most {_MOST_STATISTICS // columns:,} times, with --every or --interval."
         )
-    with _start(library, job, job.starts(job.first, 1)):
+    with _start(library, job, job.first, 1):
         pass
 
 
-def _start(library: SceneLibrary, job: Job, states: Rows) -> LiveEnsemble:
-    live = library.start_ensemble(job.method, step=job.step, states=states, tolerance=job.tolerance)
+def _start(library: SceneLibrary, job: Job, first: int, members: int) -> LiveEnsemble:
+    states, parameters = job.starts(first, members)
+    live = library.start_ensemble(
+        job.method,
+        step=job.step,
+        states=states,
+        parameters=parameters,
+        tolerance=job.tolerance,
+    )
     if live is None:
         raise UsageError(f"{job.method} does not step ensembles of this scene.")
     return live
@@ -268,7 +276,7 @@ def run_chunk(library: SceneLibrary, job: Job, part: Part, first: int, meter: Me
     kept: dict[int, list[Vector]] = {k: [] for k in job.keep if first <= k < first + members}
     done = 0
     stretch = _FIRST_STEPS
-    with _start(library, job, job.starts(first, members)) as live:
+    with _start(library, job, first, members) as live:
         live.observe(rows)
         watch = _Watch(description, rows)
         alive &= watch.finite

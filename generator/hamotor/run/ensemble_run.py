@@ -226,8 +226,10 @@ def run_ensemble(
     """
     simulation = scene if isinstance(scene, Simulation) else load(scene)
     chosen, reason = method or simulation.method, ""
-    if simulation.methods:
-        chosen, reason = choose_method(chosen, simulation.methods, None, simulation.structure)
+    if offered := simulation.offered_to_ensembles:
+        if method is None and chosen not in offered:
+            chosen = "auto"  # what the scene asks for is of its specialised form only
+        chosen, reason = choose_method(chosen, offered, None, simulation.structure)
     if scalar not in SCALARS:
         raise UsageError(f"ensembles are stepped in {' and '.join(SCALARS)}, not {scalar}.")
     if engine not in ENGINES:
@@ -495,10 +497,10 @@ def _range(
         members = shape[0]
         if member is not None:
             raise UsageError("with states of your own, run one member by giving its state alone.")
-    elif not simulation.ensemble.bodies:
+    elif not (simulation.ensemble.bodies or simulation.ensemble.parameters):
         raise UsageError(
-            f"{simulation.name}: all members would be the same; say in [[ensemble.body]] what "
-            "differs, or give states."
+            f"{simulation.name}: all members would be the same; say in [[ensemble.body]] or "
+            "[[ensemble.parameter]] what differs, or give states."
         )
     if members is None or not 1 <= members <= MOST_MEMBERS:
         raise UsageError(f"members must be a whole number from 1 to {MOST_MEMBERS:.0e}.")

@@ -82,6 +82,8 @@ class EnsembleDescription:
 
     lanes: int
     isa: str
+    parameters: tuple[str, ...]
+    """What members can have values of their own of."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,7 @@ def describe(text: str) -> Description:
             events=tuple(
                 Event(e["name"], e["direction"], bool(e["stops"])) for e in said["events"]
             ),
-            ensemble=EnsembleDescription(int(many["lanes"]), many["isa"])
+            ensemble=EnsembleDescription(int(many["lanes"]), many["isa"], tuple(many["parameters"]))
             if (many := said.get("ensemble"))
             else None,
         )
@@ -298,11 +300,18 @@ class SceneLibrary:
         return LiveRun(self._c, handle, self.description)
 
     def start_ensemble(
-        self, method: str, *, step: float, states: Rows, tolerance: float | None = None
+        self,
+        method: str,
+        *,
+        step: float,
+        states: Rows,
+        parameters: Rows | None = None,
+        tolerance: float | None = None,
     ) -> LiveEnsemble | None:
         """Begin a run of every row of `states`, shape (members, state_size), at t = 0.
 
-        Methods that choose their steps do so for each.  None for one that the library has no
+        `parameters`, shape (members, parameters): None for the scene's own.  Methods that choose
+        their steps do so for each.  None for one that the library has no
         ensembles of.
         """
         size = self.description.state_size
@@ -312,6 +321,7 @@ class SceneLibrary:
                 "and to be compiled for ensembles."
             )
         initial = np.ascontiguousarray(states, dtype=np.float64)
+        values = None if parameters is None else np.ascontiguousarray(parameters)
         handle = self._c.hamotor_ensemble_start(
             method.encode(),
             0.0,
@@ -319,7 +329,7 @@ class SceneLibrary:
             tolerance or 0.0,
             len(initial),
             _pointer(initial),
-            None,
+            None if values is None else _pointer(values),
             1,
             0,
         )

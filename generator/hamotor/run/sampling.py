@@ -13,14 +13,17 @@ from hamotor.scene.draws import BodyDraws, Draw, Ensemble, Turn
 
 def numbers_each(ensemble: Ensemble) -> int:
     """Random numbers that every member has."""
-    return sum(draw.numbers for body in ensemble.bodies for draw in body.draws)
+    of_bodies = sum(draw.numbers for body in ensemble.bodies for draw in body.draws)
+    return of_bodies + sum(parameter.draw.numbers for parameter in ensemble.parameters)
 
 
-def starts(ensemble: Ensemble, own: Vector, seed: int, first: int, members: int) -> Rows:
-    """The states at which `members` members from `first` start, shape (members, state_size).
+def starts(
+    ensemble: Ensemble, own: Vector, seed: int, first: int, members: int
+) -> tuple[Rows, Rows]:
+    """The states at which `members` members from `first` start, and their parameters.
 
-    `own` is the scene's own state, per body the motor and the momentum.  A member's row does not
-    depend on the others.
+    Shapes (members, state_size) and (members, parameters).  `own` is the scene's own state, per
+    body the motor and the momentum.  A member's rows do not depend on the others.
     """
     each = numbers_each(ensemble)
     numbers = uniforms(seed, first, members, each) if each else np.empty((members, 0))
@@ -28,7 +31,8 @@ def starts(ensemble: Ensemble, own: Vector, seed: int, first: int, members: int)
     states = np.tile(np.asarray(own, dtype=np.float64), (members, 1))
     for body in ensemble.bodies:
         _place(body, drawn, states)
-    return states
+    parameters = [drawn.take(parameter.draw)[0] for parameter in ensemble.parameters]
+    return states, np.array(parameters).reshape(len(parameters), members).T.copy()
 
 
 class _Drawn:

@@ -28,7 +28,7 @@ from hamotor.run.tolerance import meet_tolerance
 from hamotor.scene.draws import ALIKE, Ensemble
 
 if TYPE_CHECKING:
-    from hamotor.scene import GeneralScene, Scene
+    from hamotor.scene import Form, GeneralScene, Scene
     from hamotor.scene.building import BodyWords
 
 KERNELS = ("generated", "generic")
@@ -70,6 +70,8 @@ class Simulation:
     """The initial state in 60 digits."""
     ensemble: Ensemble = ALIKE
     """What differs from member to member."""
+    member_methods: Mapping[str, int] = field(default_factory=dict)
+    """Names and orders of the methods that step members; none given: as `methods`."""
 
     @property
     def exact_state(self) -> tuple[Fraction, ...]:
@@ -117,10 +119,13 @@ class Simulation:
                 )
             source = self.matrix_source(scalar)
         else:
-            own_text = (method,) if method == "taylor" else ()
+            own_text: tuple[str, ...] = (method,) if method == "taylor" else ()
+            if ensembles and self.ensemble.parameters:
+                own_text = (method or "", "drawn")
             source = self.source(kernels, scalar, *own_text)
         if method is not None and self.methods:
-            check_method(method, self.offered(kernels, representation))
+            offered = self.offered(kernels, representation)
+            check_method(method, self.offered_to_ensembles if ensembles else offered)
             source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
         if ensembles:
             source = f"#define HAMOTOR_ENSEMBLE\n{source}"
@@ -133,6 +138,11 @@ class Simulation:
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
         return Compiled(build, SceneLibrary(build.library), generate_s, source)
+
+    @property
+    def offered_to_ensembles(self) -> Mapping[str, int]:
+        """Names and orders of the methods that step members; none where `methods` is."""
+        return self.member_methods or self.methods
 
     def offered(self, kernels: str, representation: str) -> Mapping[str, int]:
         """Names and orders of the methods for a form of the scene; none where `methods` is."""
@@ -400,8 +410,9 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "has_events": bool(found.events),
             "spec_hash": found.sha256,
             "structure": structure_of(found),
-            "ensemble": asdict(found.ensemble),
+            "ensemble": asdict(_ensemble(found)),
             "methods": methods_offered(found.form),
+            "member_methods": methods_offered(_form_of_members(found)),
         }
 
     def source(*choice: str) -> str:
@@ -425,6 +436,26 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         read=read,
         matrix_source=in_matrices,
     )
+
+
+def _ensemble(scene: Scene | GeneralScene) -> Ensemble:
+    """With its parameters, where there are any."""
+    from hamotor.scene import Scene
+
+    if isinstance(scene, Scene) and scene.draws_parameters:
+        return scene.general.ensemble
+    return scene.ensemble
+
+
+def _form_of_members(scene: Scene | GeneralScene) -> Form:
+    """What kinds of methods step members."""
+    from hamotor.scene import Form, Scene
+
+    if isinstance(scene, Scene):
+        if not scene.draws_parameters:
+            return scene.form
+        scene = scene.general
+    return Form.GENERAL if scene.draws_rates else scene.form
 
 
 def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) -> Simulation:

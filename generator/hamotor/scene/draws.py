@@ -81,11 +81,22 @@ class BodyDraws:
 
 
 @dataclass(frozen=True)
+class ParameterDraw:
+    """A parameter of the energy or of an interaction, which every member has one of its own."""
+
+    name: str
+    """`k` of [hamiltonian] or [lagrangian], `2.k` of the second interaction."""
+    draw: Draw
+    """Of its value."""
+
+
+@dataclass(frozen=True)
 class Ensemble:
     """What a scene says of its ensembles."""
 
     seed: int = 0
     bodies: tuple[BodyDraws, ...] = ()
+    parameters: tuple[ParameterDraw, ...] = ()
     keep: tuple[int, ...] = ()
     quantiles: tuple[float, ...] = ()
     final_states: bool = True
@@ -96,19 +107,23 @@ class Ensemble:
         return Ensemble(
             seed=said["seed"],
             bodies=tuple(map(_body_from_json, said["bodies"])),
+            parameters=tuple(
+                ParameterDraw(x["name"], _draw_from_json(x["draw"])) for x in said["parameters"]
+            ),
             keep=tuple(said["keep"]),
             quantiles=tuple(said["quantiles"]),
             final_states=said["final_states"],
         )
 
 
+def _draw_from_json(said: Mapping[str, Any]) -> Draw:
+    values = tuple(map(tuple, said["values"]))
+    return Draw(said["shape"], tuple(said["first"]), tuple(said["second"]), values)
+
+
 def _body_from_json(said: Mapping[str, Any]) -> BodyDraws:
     def draw(x: Mapping[str, Any] | None) -> Draw | None:
-        return None if x is None else certain(x)
-
-    def certain(x: Mapping[str, Any]) -> Draw:
-        values = tuple(map(tuple, x["values"]))
-        return Draw(x["shape"], tuple(x["first"]), tuple(x["second"]), values)
+        return None if x is None else _draw_from_json(x)
 
     turn = said["turn"]
     return BodyDraws(
@@ -118,10 +133,10 @@ def _body_from_json(said: Mapping[str, Any]) -> BodyDraws:
         place=draw(said["place"]),
         turn=None
         if turn is None
-        else Turn(turn["kind"], certain(turn["draw"]), tuple(turn["axis"])),
+        else Turn(turn["kind"], _draw_from_json(turn["draw"]), tuple(turn["axis"])),
         growth=draw(said["growth"]),
-        momenta=tuple((k, certain(x)) for k, x in said["momenta"]),
-        rates=tuple((k, certain(x)) for k, x in said["rates"]),
+        momenta=tuple((k, _draw_from_json(x)) for k, x in said["momenta"]),
+        rates=tuple((k, _draw_from_json(x)) for k, x in said["rates"]),
         kinetic=tuple(map(tuple, said["kinetic"])),
     )
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from hamotor.codegen.algebra import Algebra
 from hamotor.codegen.group import LieGroup
 from hamotor.errors import suggest
 from hamotor.scene import schema
-from hamotor.scene.draws import BodyDraws, Draw, Ensemble, Turn
+from hamotor.scene.draws import BodyDraws, Draw, Ensemble, ParameterDraw, Turn
 from hamotor.scene.general import product
 from hamotor.scene.motors import Matrix, Vector, unit
 from hamotor.scene.table import Table, kind_of, listed, quoted
@@ -32,7 +32,11 @@ class Start:
     scale: float | None
 
 
-def read_ensemble(top: Table, started: Callable[[], Sequence[Start]]) -> Ensemble:
+def read_ensemble(
+    top: Table,
+    started: Callable[[], Sequence[Start]],
+    parameters: tuple[ParameterDraw, ...] = (),
+) -> Ensemble:
     """The scene's [ensemble].  Every mistake is a UsageError that names the key."""
     table = top.table("ensemble", schema.ENSEMBLE, heading=True)
     tables = table.tables("body")
@@ -61,10 +65,71 @@ def read_ensemble(top: Table, started: Callable[[], Sequence[Start]]) -> Ensembl
     return Ensemble(
         seed=table.integer("seed"),
         bodies=tuple(bodies),
+        parameters=parameters,
         keep=table.wholes("keep"),
         quantiles=table.fractions("quantiles"),
         final_states=table.flag("final_states"),
     )
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A parameter that the file wants drawn."""
+
+    table: Table
+    interaction: int
+    """From 1; 0 for a parameter of [hamiltonian] or [lagrangian]."""
+    name: str
+
+    @property
+    def symbol(self) -> str:
+        """How the energy calls it."""
+        return f"{self.interaction}.{self.name}" if self.interaction else self.name
+
+
+def wanted_parameters(top: Table) -> list[Wanted]:
+    """What [[ensemble.parameter]] names, before it is known whether there is any such."""
+    given = top.values.get("ensemble", {})
+    tables = given.get("parameter", []) if isinstance(given, dict) else []
+    if not tables:
+        return []
+    found: list[Wanted] = []
+    outer = top.table("ensemble", schema.ENSEMBLE, heading=True)
+    for number, values in enumerate(outer.tables("parameter"), 1):
+        place = f"[[ensemble.parameter]] {number}"
+        table = Table(top.file, place, values, schema.ENSEMBLE_PARAMETER, top.group)
+        table.refuse_unknown_keys()
+        interaction = table.integer("interaction") if table.has("interaction") else 0
+        one = Wanted(table, interaction, table.name("name"))
+        if one.symbol in [other.symbol for other in found]:
+            table.fail(f"{quoted(one.symbol)} is drawn already", "name")
+        found.append(one)
+    return found
+
+
+def parameter_draws(
+    wanted: Sequence[Wanted], known: Mapping[str, float]
+) -> tuple[ParameterDraw, ...]:
+    """The draws of parameters that the energy has, with their values in the scene."""
+    found = []
+    for one in wanted:
+        if one.symbol not in known:
+            start = f"{one.interaction}." if one.interaction else ""
+            names = [n.removeprefix(start) for n in known if n.startswith(start)]
+            names = [name for name in names if "." not in name]
+            where = f"interaction {one.interaction}" if one.interaction else "the energy"
+            one.table.fail(
+                f"{where} has no parameter {quoted(one.name)}; it has {listed(names) or 'none'}."
+                f"{suggest(one.name, names)}",
+                "name",
+            )
+        own = known[one.symbol]
+        draw = _distribution(one.table, "distribution", 1, (0.0,))
+        given = one.table.values["distribution"]
+        if draw.shape == "normal" and "mean" not in given:
+            draw = Draw("normal", (own,), draw.second)
+        found.append(ParameterDraw(one.symbol, draw))
+    return tuple(found)
 
 
 def _body(table: Table, start: Start, first: int) -> BodyDraws:

@@ -88,6 +88,8 @@ class GeneralScene:
     """Functions of the state whose zeros a run finds."""
     headers: tuple[str, ...] = ()
     """Texts of the headers of an algebra of the user's own."""
+    drawn: tuple[Any, ...] = ()
+    """The parameters that members have values of their own of (SymPy's symbols)."""
     ensemble: Ensemble = ALIKE
     """What differs from member to member."""
 
@@ -115,6 +117,12 @@ class GeneralScene:
         from hamotor.mechanics.parts import kinetic_parts
 
         return None if self.lagrangian is not None else kinetic_parts(self.hamiltonian)
+
+    @property
+    def draws_rates(self) -> bool:
+        """Whether what members differ in is part of the kinetic energy."""
+        symbols = {s for rates in self.hamiltonian.rates for x in rates for s in x.free_symbols}
+        return bool(symbols & set(self.drawn))
 
     @property
     def form(self) -> Form:

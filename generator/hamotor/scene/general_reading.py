@@ -22,7 +22,7 @@ from hamotor.mechanics.lagrangian import Lagrangian, NotHyperregular
 from hamotor.mechanics.language import Vector, read_number, read_vector
 from hamotor.mechanics.vocabulary import Speaker, vocabulary
 from hamotor.scene import schema
-from hamotor.scene.ensemble import Start, read_ensemble
+from hamotor.scene.ensemble import Start, Wanted, parameter_draws, read_ensemble, wanted_parameters
 from hamotor.scene.exact import of_mpmath
 from hamotor.scene.general import (
     GeneralBody,
@@ -75,6 +75,8 @@ class _System:
     parameters: dict[Expr, Expr] = field(default_factory=dict)
     applied: list[list[Expr]] = field(default_factory=list)
     acting: list[str] = field(default_factory=list)
+    wanted: Sequence[Wanted] = ()
+    """Parameters that members have values of their own of."""
 
     def draft(self, table: Table, key: str = "body") -> _Draft:
         """The body that a key names."""
@@ -90,6 +92,24 @@ class _System:
         """Add a potential that the runtime has no formula of its own for."""
         self.energy += energy
         self.potential += energy
+
+    def numbers(self, table: Table, number: int, key: str) -> tuple[Expr, ...]:
+        """A vector of an interaction; what of it is drawn by a symbol with this value."""
+        values = table.vector(key)
+        return tuple(
+            self._own(f"{number}.{key}_{axis}", x) for axis, x in zip("xyzw", values, strict=False)
+        )
+
+    def number(self, table: Table, number: int, key: str) -> Expr:
+        """The same for a number."""
+        return self._own(f"{number}.{key}", table.number(key))
+
+    def _own(self, name: str, x: float) -> Expr:
+        if name not in [one.symbol for one in self.wanted]:
+            return _number(x)
+        symbol = sympy.Symbol(name, real=True)
+        self.parameters[symbol] = _number(x)
+        return symbol
 
     def apply(self, draft: _Draft, forque: Sequence[Expr]) -> None:
         """Add an applied forque."""
@@ -123,7 +143,7 @@ def read_general(
         if body in names[: number - 1]:
             first = names.index(body) + 1
             top.fail(f'body {number}: name: "{body}" is the name of body {first} already')
-    system = _System(drafts)
+    system = _System(drafts, wanted=wanted_parameters(top))
     own = next((key for key in ("hamiltonian", "lagrangian") if top.has(key)), None)
     if top.has("hamiltonian") and top.has("lagrangian"):
         top.fail('"hamiltonian" and "lagrangian" contradict each other; give one')
@@ -141,6 +161,10 @@ def read_general(
         _lagrangian(top.table(own, schema.LAGRANGIAN, heading=True), system)
     for number, values in enumerate(acting, 1):
         _interaction(top, number, dict(values), view, system)
+    symbols = {symbol.name: symbol for symbol in system.parameters}
+    draws = parameter_draws(
+        system.wanted, {symbol.name: float(x) for symbol, x in system.parameters.items()}
+    )
     coordinates = tuple(draft.coordinates for draft in drafts)
     applied = tuple(tuple(forque) for forque in system.applied)
     lagrangian = None
@@ -182,8 +206,11 @@ def read_general(
         sha256=hashlib.sha256(contents).hexdigest(),
         events=_events(top, system, None if lagrangian else hamiltonian),
         headers=headers,
+        drawn=tuple(symbols[one.symbol] for one in system.wanted),
         ensemble=read_ensemble(
-            top, lambda: _starts(drafts, started, None if lagrangian else hamiltonian)
+            top,
+            lambda: _starts(drafts, started, None if lagrangian else hamiltonian),
+            draws,
         ),
     )
 
@@ -427,8 +454,8 @@ def _interaction(
     readers[kind](table, system, number)
 
 
-def _gravity(table: Table, system: _System, _number_of: int) -> None:
-    field_ = _numbers(table.vector("acceleration"))
+def _gravity(table: Table, system: _System, number: int) -> None:
+    field_ = system.numbers(table, number, "acceleration")
     for draft in system.drafts:
         if draft.mass is None:
             table.fail(f'body "{draft.name}" has no mass for gravity to act on')
@@ -449,7 +476,7 @@ def _shown(values: Sequence[float]) -> str:
     return "(" + ", ".join(f"{x:.6g}" for x in values) + ")"
 
 
-def _spring(table: Table, system: _System, _number_of: int) -> None:
+def _spring(table: Table, system: _System, number: int) -> None:
     draft = system.draft(table)
     near = draft.coordinates.at(_numbers(table.vector("at")))
     if table.one_of("anchor", "other") == "anchor":
@@ -464,7 +491,12 @@ def _spring(table: Table, system: _System, _number_of: int) -> None:
         far = other.coordinates.at(_numbers(table.vector("other_at")))
         end = f"{_shown(table.vector('other_at'))} of {other.name}"
     stiffness, rest = table.number("stiffness"), table.number("rest_length")
-    system.energy += interactions.spring(near, far, _number(stiffness), _number(rest))
+    system.energy += interactions.spring(
+        near,
+        far,
+        system.number(table, number, "stiffness"),
+        system.number(table, number, "rest_length"),
+    )
     system.acting.append(
         f"spring from {_shown(table.vector('at'))} of {draft.name} to {end}, {stiffness:g} N/m,"
         f" rest length {rest:g} m"
@@ -478,11 +510,11 @@ def _potential(table: Table, system: _System, number: int) -> None:
     system.acting.append(f"potential {text}")
 
 
-def _newtonian(table: Table, system: _System, _number_of: int) -> None:
+def _newtonian(table: Table, system: _System, number: int) -> None:
     draft = system.draft(table)
     if table.one_of("center", "other") == "center":
         center = _numbers(table.vector("center"))
-        strength = _number(table.number("strength"))
+        strength = system.number(table, number, "strength")
         system.add_potential(_attracted(table, draft, center, strength))
         system.acting.append(
             f"Newtonian attraction of {draft.name} to {_shown(table.vector('center'))},"
@@ -492,7 +524,7 @@ def _newtonian(table: Table, system: _System, _number_of: int) -> None:
     other = system.draft(table, "other")
     if other is draft:
         table.fail(f'"{draft.name}" does not attract itself', "other")
-    constant = _number(table.number("constant"))
+    constant = system.number(table, number, "constant")
     one, two = _weights(table, draft), _weights(table, other)
     system.add_potential(constant * interactions.newtonian_of_points(one, two))
     system.acting.append(
@@ -567,14 +599,17 @@ def _torque(table: Table, system: _System, number: int) -> None:
     system.acting.append(f"torque {text} N m on {draft.name}")
 
 
-def _damping(table: Table, system: _System, _number_of: int) -> None:
+def _damping(table: Table, system: _System, number: int) -> None:
     draft = system.draft(table)
     linear, angular = table.number("linear"), table.number("angular")
     rates = draft.coordinates.rates
     if system.lagrangian is None:
         rates = tuple(sympy.diff(system.energy, p) for p in draft.coordinates.momenta)
     forque = interactions.damping_forque(
-        draft.coordinates, rates, _number(linear), _number(angular)
+        draft.coordinates,
+        rates,
+        system.number(table, number, "linear"),
+        system.number(table, number, "angular"),
     )
     system.apply(draft, forque)
     system.acting.append(

@@ -11,6 +11,7 @@ from hamotor.codegen import cpp
 from hamotor.codegen.algebra import Blade, Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import Number, Program
+from hamotor.errors import UsageError
 from hamotor.mechanics.coordinates import Coordinates
 from hamotor.mechanics.lagrangian import Lagrangian
 from hamotor.mechanics.legendre import LagrangianSystem
@@ -65,18 +66,24 @@ class ProgramText:
 
 
 def general_source(
-    whole: Scene | GeneralScene, kernels: str, scalar: Scalar, method: str | None = None
+    whole: Scene | GeneralScene,
+    kernels: str,
+    scalar: Scalar,
+    method: str | None = None,
+    *,
+    drawn: bool = False,
 ) -> str:
     """The text of the C++ file that defines a scene over the runtime's headers.
 
     kernels: `generated`, or `generic`: products by table, of dense multivectors.
     method: the one that it is for.
+    drawn: the parameters that members differ in stay variables of the system.
 
     ValueError if its programs are not those of its Hamiltonian: a defect of ours.
     """
     invariants = conserved_by(whole)
     scene = whole if isinstance(whole, GeneralScene) else whole.general
-    system = scene.system
+    system = System(scene.hamiltonian, scene.drawn) if drawn else scene.system
     first = scene.bodies[0].coordinates
     by_name = kernels == "generic"
     group_type = f"hamotor::{scene.algebra}::{scene.group.name}"
@@ -85,7 +92,9 @@ def general_source(
     if scene.lagrangian is not None:
         own_system = _lagrangian(scene.lagrangian, group_type, by_name)
     else:
-        own_system = _hamiltonian(scene) | {"parts": None if by_name else _parts(scene)}
+        own_system = _hamiltonian(scene, system)
+        split = not by_name and not (drawn and scene.draws_rates)
+        own_system["parts"] = _parts(scene, system) if split else None
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
     names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
     units = ["m"] * first.dimension
@@ -98,6 +107,8 @@ def general_source(
             for b in scene.bodies
         ]
     own = [(q, x) for q, x in invariants if x is not None and not has_column(scene, q.name)]
+    if drawn:
+        _refuse_drawn(scene, method, [x for _, x in own])
     return rendered(
         "general_scene.cpp.jinja",
         scene=scene,
@@ -111,6 +122,10 @@ def general_source(
         group_type=group_type,
         bodies=[text_literal(body.name) for body in scene.bodies],
         **own_system,
+        parameters=[
+            (text_literal(s.name), f"S({literal_text(float(scene.hamiltonian.parameters[s]))})")
+            for s in system.drawn
+        ],
         recurrence=_recurrence(scene, method, by_name),
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
         motor_units=[text_literal(motor_unit(scene, name)) for name in scene.group.motor],
@@ -133,6 +148,20 @@ def general_source(
         events=events_text(scene),
         conserved=[conserved_entry(scene, q, own) for q, _ in invariants],
     )
+
+
+def _refuse_drawn(scene: GeneralScene, method: str | None, own: Sequence[Any]) -> None:
+    """UsageError where members cannot have parameters of their own."""
+    why = ""
+    if scene.lagrangian is not None:
+        why = "the rates of its Lagrangian are found by Newton's method"
+    elif method == "taylor":
+        why = "taylor's recurrence has them as numbers"
+    elif any(set(scene.drawn) & x.free_symbols for x in own):
+        why = "what the scene conserves depends on them"
+    if why:
+        names = ", ".join(symbol.name for symbol in scene.drawn)
+        raise UsageError(f"{scene.name}: {names} cannot be drawn: {why}.")
 
 
 def conserved_by(scene: Scene | GeneralScene) -> list[tuple[ConservedQuantity, Any]]:
@@ -173,10 +202,10 @@ def _entries(rows: Sequence[Mapping[Blade, Rational]]) -> list[str]:
     ]
 
 
-def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
-    """The system of an H in formulas, for the template."""
-    system, count = scene.system, len(scene.bodies)
-    prove_energy_balance(system)
+def _hamiltonian(scene: GeneralScene, system: System) -> dict[str, Any]:
+    """The system of an H in formulas, for the template; proved with its parameters as numbers."""
+    count = len(scene.bodies)
+    prove_energy_balance(scene.system)
     gradient = ProgramText(system.gradient)
     forques = [x for name, x in system.gradient.outputs if name.startswith("forque")]
     return {
@@ -195,11 +224,11 @@ def _hamiltonian(scene: GeneralScene) -> dict[str, Any]:
     }
 
 
-def _parts(scene: GeneralScene) -> dict[str, Any] | None:
+def _parts(scene: GeneralScene, system: System) -> dict[str, Any] | None:
     """The known motions of a kinetic energy, for the template."""
     if scene.parts is None:
         return None
-    system, count = scene.system, len(scene.bodies)
+    count = len(scene.bodies)
     rate, forque = ProgramText(system.rate), ProgramText(system.forque)
     flows: list[dict[str, Any]] = []
     steps = []

@@ -155,7 +155,9 @@ class Scene:
     reread: Callable[[], GeneralScene] = field(repr=False, compare=False)
     """Reads `general`."""
     ensemble: Ensemble = ALIKE
-    """What differs from member to member."""
+    """What differs from member to member; parameters are read with `general`."""
+    draws_parameters: bool = False
+    """Whether members have parameters of their own; then `general` is what is stepped."""
 
     @cached_property
     def general(self) -> GeneralScene:

@@ -17,7 +17,7 @@ import numpy as np
 from hamotor.codegen.spec import bundled_algebra, bundled_algebras, bundled_group
 from hamotor.errors import UsageError, suggest
 from hamotor.scene import inertia, schema
-from hamotor.scene.ensemble import Start, read_ensemble
+from hamotor.scene.ensemble import Start, read_ensemble, wanted_parameters
 from hamotor.scene.exact import decimal, rounded, written
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
@@ -144,7 +144,10 @@ def parse_scene(
         has_events=bool(top.tables("event")),
         reread=lambda: _general(top, algebra, name, contents, folder),
         ensemble=read_ensemble(top, lambda: _starts(bodies)),
+        draws_parameters=bool(wanted_parameters(top)),
     )
+    if scene.draws_parameters:
+        scene.general  # noqa: B018  # read now, so that their mistakes are told now
     if scene.potential is not None and not scene.general.hamiltonian.autonomous:
         return scene.general
     _refuse_singular_springs(top, scene)

@@ -521,6 +521,12 @@ ENSEMBLE = Section(
     (
         Key("seed", "whole", "of the random numbers, below 2^63", default="0"),
         Key("body", "tables", "[[ensemble.body]]: what is drawn of the bodies", default="[]"),
+        Key(
+            "parameter",
+            "tables",
+            "[[ensemble.parameter]]: what is drawn of parameters and interactions",
+            default="[]",
+        ),
         Key("keep", "wholes", "members whose trajectories are written", default="[]"),
         Key(
             "quantiles",
@@ -553,6 +559,22 @@ ENSEMBLE_BODY = Section(
             "table",
             "distributions under linear and angular, or under the group's generators",
         ),
+    ),
+)
+
+ENSEMBLE_PARAMETER = Section(
+    "[[ensemble.parameter]]",
+    "a drawn parameter",
+    (
+        Key(
+            "name",
+            "name",
+            "one of the parameters of [hamiltonian] or [lagrangian], or of an interaction (of a"
+            " vector k_x, k_y …), or an interaction's acceleration_x …, stiffness, rest_length,"
+            " strength, constant, linear, angular",
+        ),
+        Key("interaction", "integer", "which interaction it belongs to, from 1", active=False),
+        Key("distribution", "distribution", "of its value"),
     ),
 )
 
@@ -619,6 +641,7 @@ SECTIONS = (
     OUTPUT,
     ENSEMBLE,
     ENSEMBLE_BODY,
+    ENSEMBLE_PARAMETER,
     DISTRIBUTION,
     TURN,
     LIMITS,

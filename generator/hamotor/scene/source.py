@@ -26,10 +26,13 @@ def scene_source(
     kernels: str = "generated",
     scalar: str = "double",
     method: str | None = None,
+    form: str = "own",
 ) -> str:
     """The text of the C++ file that defines `scene` over the runtime's headers.
 
     method: the one that it is for; "taylor" has a text of its own, which nothing else needs.
+    form: "drawn": what [[ensemble.parameter]] draws stays variable, and the form is the general
+        one.
     Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
     for numbers that do not fit the scalar.
     """
@@ -39,10 +42,10 @@ def scene_source(
             f"{suggest(kernels, KERNELS)}"
         )
     numbers = parse_scalar(scalar)
-    if not isinstance(scene, Scene) or kernels == "generic":
+    if not isinstance(scene, Scene) or kernels == "generic" or form == "drawn":
         from hamotor.scene.general_source import general_source
 
-        return general_source(scene, kernels, numbers, method)
+        return general_source(scene, kernels, numbers, method, drawn=form == "drawn")
     if scalar == "float":
         _refuse_numbers_beyond_float(scene)
     return rendered(

@@ -82,6 +82,16 @@ struct OneForAll {
   }
 };
 
+/// A system for each block of members.
+template <class System>
+struct OneForEach {
+  std::vector<System> systems;
+  /// Blocks to spare at the end take the last one.
+  [[nodiscard]] constexpr const System& operator()(std::size_t block) const noexcept {
+    return systems[std::min(block, systems.size() - 1)];
+  }
+};
+
 /// Members of a system under way.
 ///
 /// `Systems` gives the system of a block, in which each lane may have parameters of its own.  With

@@ -74,6 +74,20 @@ template <class Scene>
 inline constexpr bool packs<Scene> =
     Scene::kernels == "generated" && !requires { SystemOf<Scene>::iterates; };
 
+/// A scene whose members can have parameters of their own.
+template <class Scene>
+concept ParametrisedScene = requires { Scene::parameters.size(); };
+
+/// The values of a scene's parameters for one member.
+template <class Scene>
+struct ParametersOf {
+  using type = std::array<typename Scene::Scalar, 0>;
+};
+template <ParametrisedScene Scene>
+struct ParametersOf<Scene> {
+  using type = std::array<typename Scene::Scalar, Scene::parameters.size()>;
+};
+
 /// Whether there are ensembles of a scene: not where members' events would be passed over, nor of
 /// scenes that bring their own kind of run.
 template <class Scene>
@@ -91,12 +105,18 @@ class EnsembleOf final : public AnyEnsemble {
       return std::type_identity<System>{};
     }
   }());
-  using Members = hamotor::Ensemble<typename Stepped::type, Method>;
+  using Parameters = typename ParametersOf<Scene>::type;
+  using Systems = std::conditional_t<ParametrisedScene<Scene>, OneForEach<typename Stepped::type>,
+                                     OneForAll<typename Stepped::type>>;
+  using Members = hamotor::Ensemble<typename Stepped::type, Method, Systems>;
 
  public:
+  /// `parameters` are none for the scene's own, or those of each member.
   EnsembleOf(const Method& method, double time, double step,
-             std::span<const typename Members::Member> members, unsigned threads)
-      : members_(system(), method, static_cast<typename Members::Number>(time),
+             std::span<const typename Members::Member> members, std::vector<Parameters> parameters,
+             unsigned threads)
+      : parameters_(std::move(parameters)),
+        members_(systems(parameters_), method, static_cast<typename Members::Number>(time),
                  static_cast<typename Members::Number>(step), members, threads) {}
 
   [[nodiscard]] std::int64_t advance(std::int64_t steps) override {
@@ -104,7 +124,8 @@ class EnsembleOf final : public AnyEnsemble {
   }
   void observe(std::int64_t first, std::int64_t count, double* rows) const override {
     for (std::int64_t k = 0; k < count; ++k, rows += columns<Scene>()) {
-      moment(static_cast<std::size_t>(first + k)).write_row(Scene::system, rows);
+      const auto member = static_cast<std::size_t>(first + k);
+      moment(member).write_row(system_of(member), rows);
     }
   }
   void read_states(double* states) const override {
@@ -129,12 +150,42 @@ class EnsembleOf final : public AnyEnsemble {
     }
   }
 
+  [[nodiscard]] static Systems systems([[maybe_unused]] std::span<const Parameters> parameters) {
+    if constexpr (!ParametrisedScene<Scene>) {
+      return system();
+    } else {
+      Systems result{{system()}};
+      if (parameters.empty()) return result;
+      constexpr std::size_t lanes = lanes_of<S>;
+      const std::size_t blocks = (parameters.size() + lanes - 1) / lanes;
+      result.systems.resize(blocks + 1, system());
+      // Lanes to spare repeat the last member, as their states do.
+      for (std::size_t k = 0; k < result.systems.size() * lanes; ++k) {
+        const Parameters& from = parameters[std::min(k, parameters.size() - 1)];
+        auto& to = result.systems[k / lanes].parameters;
+        for (std::size_t p = 0; p < from.size(); ++p) {
+          hamotor::detail::set_lane(to[p], k % lanes, from[p]);
+        }
+      }
+      return result;
+    }
+  }
+
+  [[nodiscard]] System system_of([[maybe_unused]] std::size_t member) const noexcept {
+    System result = Scene::system;
+    if constexpr (ParametrisedScene<Scene>) {
+      if (!parameters_.empty()) result.parameters = parameters_[member];
+    }
+    return result;
+  }
+
   [[nodiscard]] Moment moment(std::size_t member) const noexcept {
     Moment now{members_.time(member), members_.state(member), {}};
     if constexpr (PoweredSystem<System>) now.work = members_.work(member);
     return now;
   }
 
+  std::vector<Parameters> parameters_;
   Members members_;
 };
 
@@ -144,10 +195,12 @@ struct EnsembleStart;
 template <class Scene, class S, class... Method>
 struct EnsembleStart<Scene, S, std::tuple<Method...>> {
   using Member = StateOf<SystemOf<Scene>>;
+  using Parameters = typename ParametersOf<Scene>::type;
 
   [[nodiscard]] static std::unique_ptr<AnyEnsemble> by(std::string_view name, double time,
                                                        double step, double tolerance,
                                                        std::span<const Member> members,
+                                                       std::span<const Parameters> parameters,
                                                        unsigned threads) {
     std::unique_ptr<AnyEnsemble> result;
     const auto consider = [&]<class One>(std::type_identity<One>) {
@@ -157,7 +210,9 @@ struct EnsembleStart<Scene, S, std::tuple<Method...>> {
         if constexpr (ErrorControlled<One, typename Scene::Scalar>) {
           if (tolerance > 0) method.set_tolerance(typename Scene::Scalar(tolerance));
         }
-        result = std::make_unique<EnsembleOf<Scene, S, One>>(method, time, step, members, threads);
+        result = std::make_unique<EnsembleOf<Scene, S, One>>(
+            method, time, step, members,
+            std::vector<Parameters>(parameters.begin(), parameters.end()), threads);
       }
     };
     (consider(std::type_identity<Method>{}), ...);
@@ -182,7 +237,7 @@ struct Others<std::tuple<Method...>, Packed> {
 template <class Scene>
 [[nodiscard]] void* start_ensemble(const char* method, double time, double step, double tolerance,
                                    std::int64_t count, const double* states,
-                                   const double* /*parameters*/, std::int32_t threads,
+                                   const double* parameters, std::int32_t threads,
                                    std::int32_t lanes) noexcept {
   if constexpr (has_ensembles<Scene>) {
     using S = typename Scene::Scalar;
@@ -195,12 +250,19 @@ template <class Scene>
         members.push_back(Moment<Scene>::from_user(states));
         states += Scene::bodies.size() * body_size<Scene>;
       }
+      std::vector<typename ParametersOf<Scene>::type> values;
+      if (ParametrisedScene<Scene> && parameters != nullptr) {
+        values.resize(static_cast<std::size_t>(count));
+        for (auto& its_own : values) {
+          for (S& x : its_own) x = static_cast<S>(*parameters++);
+        }
+      }
       std::unique_ptr<AnyEnsemble> started;
       const auto start = [&]<class Lanes, class Methods>(std::type_identity<Lanes>,
                                                          std::type_identity<Methods>) {
         if (started) return;
         started = EnsembleStart<Scene, Lanes, Methods>::by(method, time, step, tolerance, members,
-                                                           static_cast<unsigned>(threads));
+                                                           values, static_cast<unsigned>(threads));
       };
       if constexpr (packs<Scene>) {
         using Wide = Pack<S, widest<S>>;
@@ -235,11 +297,17 @@ template <class Scene>
 [[nodiscard]] std::string ensemble_json() {
   if constexpr (!has_ensembles<Scene>) {
     return "null";
-  } else if constexpr (packs<Scene>) {
-    return "{\"lanes\": " + std::to_string(widest<typename Scene::Scalar>) +
-           ", \"isa\": " + json_string(instruction_set) + ", \"parameters\": []}";
   } else {
-    return R"({"lanes": 1, "isa": "scalar", "parameters": []})";
+    std::string parameters = "[]";
+    if constexpr (ParametrisedScene<Scene>) parameters = json_strings(Scene::parameters);
+    std::string lanes = "1";
+    std::string isa = "scalar";
+    if constexpr (packs<Scene>) {
+      lanes = std::to_string(widest<typename Scene::Scalar>);
+      isa = instruction_set;
+    }
+    return "{\"lanes\": " + lanes + ", \"isa\": " + json_string(isa) +
+           ", \"parameters\": " + parameters + "}";
   }
 }
 
