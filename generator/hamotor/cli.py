@@ -52,7 +52,7 @@ statistics.parquet, states/, and where there are any failures.parquet and member
 there is replaced, anything else is left alone.
 """
 
-_BENCHMARKS = ("kernels", "steps", "precision", "stability")
+_BENCHMARKS = ("kernels", "steps", "precision", "stability", "ensemble")
 _COMMANDS = ("run", "generate", "show", "table", "list", "new", "compare", "test", "bench")
 _ENSEMBLE_OPTIONS = ("seed", "threads", "member", "keep", "engine", "scheduler")
 _NOT_FOR_ENSEMBLES = {
@@ -667,6 +667,7 @@ def _bench(parsed: argparse.Namespace) -> int:
             f"{suggest(parsed.what, _BENCHMARKS)}"
         )
     from hamotor.bench import (
+        bench_ensemble,
         bench_kernels,
         bench_precision,
         bench_stability,
@@ -697,7 +698,10 @@ def _bench(parsed: argparse.Namespace) -> int:
         found = bench_stability(parsed.scenes, out, json=parsed.json, quick=parsed.quick)
         return 1 if found["failed"] else 0
     if parsed.scenes:
-        raise UsageError("bench kernels takes no scenes; the other benchmarks do.")
+        raise UsageError(f"bench {parsed.what} takes no scenes; the other benchmarks do.")
+    if parsed.what == "ensemble":
+        bench_ensemble(out, json=parsed.json, quick=parsed.quick)
+        return 0
     bench_kernels(out, json=parsed.json, quick=parsed.quick)
     return 0
 

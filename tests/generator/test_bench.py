@@ -106,7 +106,7 @@ def test_a_time_is_the_median_of_its_repetitions(
 ) -> None:
     made = program(tmp_path / "build", [said("generated"), said("Eigen Isometry3")])
     (tmp_path / "build" / "CMakeCache.txt").write_text("", encoding="utf-8")
-    monkeypatch.setattr(kernels, "_compilers", lambda: ["g++"])
+    monkeypatch.setattr(kernels, "compilers_here", lambda: ["g++"])
     monkeypatch.setattr(kernels, "_build", lambda *_: {"g++": made})
     found = bench_kernels(tmp_path / "out", json=True, quick=True)
     assert [(r["contestant"], r["mode"], r["ns"]) for r in found["rows"]] == [
@@ -125,7 +125,7 @@ def test_a_contestant_that_does_something_else_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = program(tmp_path, [said("generated"), said("ganja.js C++", 0.5)])
-    monkeypatch.setattr(kernels, "_compilers", lambda: ["g++"])
+    monkeypatch.setattr(kernels, "compilers_here", lambda: ["g++"])
     monkeypatch.setattr(kernels, "_build", lambda *_: {"g++": made})
     with pytest.raises(CheckFailed, match=r"point, ganja.js C\+\+, double: differs"):
         bench_kernels()

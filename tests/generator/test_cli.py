@@ -136,7 +136,7 @@ def test_a_rejected_text_exits_with_4(
         ("rnu", 'unknown command "rnu".*Did you mean "run"'),
         (
             "bench kernel",
-            'no benchmark "kernel"; there are kernels, steps, precision, stability. Did',
+            'no benchmark "kernel"; there are kernels, steps, precision, stability, ensemble. Did',
         ),
         ("run", "SCENE"),
         ("run toy --stpe 1", 'unknown option --stpe. Did you mean "--step"'),

@@ -66,7 +66,7 @@ def bench_kernels(
     contestants do not agree on what an operation gives.
     """
     quick = quick or brief
-    compilers = _compilers()[: 1 if brief else None]
+    compilers = compilers_here()[: 1 if brief else None]
     programs = _build(compilers, quick, brief)
     rows: list[Row] = []
     for compiler, program in programs.items():
@@ -79,7 +79,7 @@ def bench_kernels(
         "error": "largest relative error of 1000 random inputs against __float128",
         "rows": [asdict(row) for row in rows],
         "not_there": {} if brief else _not_there({row.contestant for row in rows}),
-        "provenance": _provenance(programs),
+        "provenance": program_provenance(programs),
     }
     publish(account, table, out=out, as_json=json)
     if out is not None:
@@ -88,7 +88,8 @@ def bench_kernels(
     return account
 
 
-def _compilers() -> list[str]:
+def compilers_here() -> list[str]:
+    """The compilers to measure with.  ToolError if there is none, or cmake or ninja are missing."""
     found = [compiler for compiler in COMPILERS if shutil.which(compiler)]
     if not found:
         raise ToolError("hamotor bench: no C++ compiler: neither g++ nor clang++")
@@ -104,21 +105,21 @@ def _build(compilers: Sequence[str], quick: bool, brief: bool) -> dict[str, Path
     """The benchmark program of each compiler, built side by side."""
     say(f"building with {' and '.join(compilers)}")
     with ThreadPoolExecutor(len(compilers)) as pool:
-        folders = list(pool.map(lambda compiler: _build_one(compiler, quick, brief), compilers))
-    return {
-        compiler: folder / "tests" / "bench" / "kernels"
-        for compiler, folder in zip(compilers, folders, strict=True)
-    }
+        programs = pool.map(
+            lambda compiler: build_program(compiler, "kernels", quick=quick, brief=brief), compilers
+        )
+        return dict(zip(compilers, programs, strict=True))
 
 
-def _build_one(compiler: str, quick: bool, brief: bool) -> Path:
+def build_program(compiler: str, target: str, *, quick: bool, brief: bool = False) -> Path:
+    """A program of tests/bench, built as a user's release would be.  ToolError if that fails."""
     kind = "brief-" if brief else "quick-" if quick else ""
     folder = ROOT / ".hamotor" / "build" / f"bench-{kind}{compiler}"
     cache = folder / "CMakeCache.txt"
     home = f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}\n"
     if cache.is_file() and home not in cache.read_text(encoding="utf-8"):
         shutil.rmtree(folder)  # the clone was moved
-    _run(
+    run_tool(
         "cmake", "-S", str(ROOT), "-B", str(folder), "-G", "Ninja",
         f"-DCMAKE_CXX_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=Release",
         f"-DCMAKE_CXX_FLAGS_RELEASE={FLAGS}", "-DHAMOTOR_NATIVE=ON",
@@ -126,11 +127,12 @@ def _build_one(compiler: str, quick: bool, brief: bool) -> Path:
         f"-DHAMOTOR_BENCH_DOUBLE_ONLY={'ON' if quick else 'OFF'}",
         f"-DHAMOTOR_BENCH_BRIEF={'ON' if brief else 'OFF'}",
     )  # fmt: skip
-    _run("cmake", "--build", str(folder), "--target", "kernels")
-    return folder
+    run_tool("cmake", "--build", str(folder), "--target", target)
+    return folder / "tests" / "bench" / target
 
 
-def _run(*command: str) -> str:
+def run_tool(*command: str) -> str:
+    """What a command prints.  ToolError with its first errors if it fails."""
     done = subprocess.run(
         command, capture_output=True, text=True, errors="replace", check=False, cwd=ROOT
     )
@@ -147,7 +149,7 @@ def _rows(compiler: str, program: Path, quick: bool, brief: bool) -> list[Row]:
         errors = _errors(program, Path(folder) / "errors")
         chosen = "double.*latency" if brief else "double.*(latency|256)" if quick else "."
         times = Path(folder) / "times.json"
-        _run(
+        run_tool(
             str(program),
             f"--benchmark_filter={chosen}",
             f"--benchmark_repetitions={3 if quick else 7}",
@@ -185,7 +187,7 @@ def _rows(compiler: str, program: Path, quick: bool, brief: bool) -> list[Row]:
 
 def _errors(program: Path, file: Path) -> dict[tuple[str, str, str], float]:
     """Largest relative error by operation, contestant and scalar, once all were seen to agree."""
-    _run(str(program), f"--errors={file}")
+    run_tool(str(program), f"--errors={file}")
     errors = {}
     for line in file.read_text(encoding="utf-8").splitlines():
         row = json.loads(line)
@@ -204,7 +206,8 @@ def _not_there(contestants: set[str]) -> dict[str, str]:
     return missing | UNOBTAINABLE_PEERS
 
 
-def _provenance(programs: Mapping[str, Path]) -> dict[str, Any]:
+def program_provenance(programs: Mapping[str, Path]) -> dict[str, Any]:
+    """Where the programs of each compiler come from."""
     program = next(iter(programs.values()))
     return provenance(
         compilers={compiler: _first_line(compiler, "--version") for compiler in programs},
@@ -217,7 +220,7 @@ def _provenance(programs: Mapping[str, Path]) -> dict[str, Any]:
 
 
 def _first_line(*command: str) -> str:
-    return _run(*command).splitlines()[0].strip()
+    return run_tool(*command).splitlines()[0].strip()
 
 
 def _package_version(program: Path, package: str) -> str:

@@ -1,0 +1,253 @@
+// `ensemble [--quick]`: bodies' steps a second in packs, one JSON object on stdout.
+#include "ensemble.hpp"
+
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <span>
+#include <string>
+#include <thread>
+#include <tuple>
+#include <utility>
+#include <vector>
+
+#include "hamotor/counted.hpp"
+#include "hamotor/ensemble.hpp"
+#include "hamotor/pack.hpp"
+#include "hamotor/pga3/se3.hpp"
+#include "hamotor/pga3/so3.hpp"
+#include "hamotor/steppers.hpp"
+#include "hamotor/systems.hpp"
+
+namespace bench {
+namespace {
+
+using hamotor::Summation;
+using hamotor::pga3::SE3;
+using hamotor::pga3::SO3;
+using Lanes = hamotor::Pack<double, hamotor::widest<double>>;
+constexpr auto split = hamotor::rotation_split(moments);
+
+template <class S>
+constexpr std::array<S, 3> in(const std::array<double, 3>& x) {
+  return {S(x[0]), S(x[1]), S(x[2])};
+}
+
+/// A body about a fixed point, attitude and angular momentum only.
+struct FreeRotation {
+  static constexpr const char* name = "free rotation, SO(3)";
+  template <class S>
+  static constexpr auto system() {
+    return hamotor::RigidBodies{
+        std::tuple{hamotor::PivotedBody<SO3, S, split>(S(mass), in<S>(moments), {}, {})}};
+  }
+};
+
+struct FreeMotion {
+  static constexpr const char* name = "free motion, SE(3)";
+  template <class S>
+  static constexpr auto system() {
+    return hamotor::RigidBodies{
+        std::tuple{hamotor::FreeBody<SE3, S, split>(S(mass), in<S>(moments))}};
+  }
+};
+
+/// From a point of the body to the world's origin.
+struct Spring {
+  static constexpr const char* name = "spring, SE(3)";
+  template <class S>
+  static constexpr auto system() {
+    const auto at = in<S>(spring_at);
+    return hamotor::RigidBodies{
+        std::tuple{hamotor::FreeBody<SE3, S, split>(S(mass), in<S>(moments))},
+        std::tuple{hamotor::SpringToWorld<0, SE3, S, hamotor::RestLength::zero>{
+            .at = {at[0], at[1], at[2]},
+            .anchor = {S(0), S(0), S(0)},
+            .stiffness = S(stiffness),
+            .rest_length = S(0)}}};
+  }
+};
+
+template <class System>
+using Rk4 = hamotor::Rk4<System>;
+template <class System>
+using Strang = hamotor::Splitting2<System, Summation::plain>;
+template <class System>
+using Order4 = hamotor::Splitting4<System, Summation::plain>;
+template <class System>
+using StrangCompensated = hamotor::Splitting2<System>;
+template <class System>
+using Order4Compensated = hamotor::Splitting4<System>;
+
+template <class System>
+hamotor::State<typename System::Group, 1, double> member(std::size_t k) {
+  using State = hamotor::State<typename System::Group, 1, double>;
+  using Momentum = typename State::Momentum;
+  std::array<double, Momentum::size> mu{};
+  std::copy_n(momentum_of(k).begin(), mu.size(), mu.begin());
+  return {{State::Element::identity()}, {Momentum::from(mu)}};
+}
+
+/// Operations of a step, a multiply-add counted as two.
+template <class Problem, template <class> class Method>
+double flops() {
+  using S = hamotor::Counted;
+  const auto system = Problem::template system<S>();
+  using System = std::remove_cvref_t<decltype(system)>;
+  hamotor::StateOf<System> state{};
+  const auto start = member<System>(0);
+  state.motors[0] = start.motors[0].template cast<S>();
+  auto mu = state.momenta[0].components();
+  for (std::size_t k = 0; k < mu.size(); ++k) mu[k] = start.momenta[0].components()[k];
+  state.momenta[0] = std::remove_cvref_t<decltype(state.momenta[0])>::from(mu);
+  Method<System> method;
+  method.do_step(system, state, S(0), S(step));
+  hamotor::Counted::counts.fill(0);
+  constexpr int steps = 10;
+  for (int k = 0; k < steps; ++k) method.do_step(system, state, S(0), S(step));
+  const auto& counts = hamotor::Counted::counts;
+  return static_cast<double>(counts[S::additions] + counts[S::products]) / steps;
+}
+
+/// Multiply-adds that wait for nothing: FLOP/s.
+[[gnu::noinline]] double peak() {
+  constexpr int rounds = 20000;
+  constexpr std::size_t chains = 12;
+  std::array<Lanes, chains> sums;
+  for (std::size_t k = 0; k < chains; ++k) sums[k] = Lanes(1.0 + static_cast<double>(k));
+  const Lanes factor(0.999);
+  const Lanes term(0.001);
+  const double taken = shortest(40, [&] {
+    [&]<std::size_t... k>(std::index_sequence<k...>) {
+      std::tuple local{sums[k]...};
+      for (int n = 0; n < rounds; ++n) {
+        ((std::get<k>(local) = hamotor::mul_add(std::get<k>(local), factor, term)), ...);
+      }
+      ((sums[k] = std::get<k>(local)), ...);
+    }(std::make_index_sequence<chains>{});
+  });
+  double sum = 0;
+  for (const Lanes& x : sums) sum += x[0];
+  // Read, so that the loop is not left out.
+  if (!(sum > 0)) std::fprintf(stderr, "peak: %g\n", sum);
+  return 2.0 * rounds * chains * Lanes::lanes / taken;
+}
+
+class Report {
+ public:
+  explicit Report(bool quick) : quick_(quick) {}
+
+  template <class Problem, template <class> class Method>
+  void measure(const char* method, bool all_sizes) {
+    const double operations = flops<Problem, Method>();
+    const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
+    for (const std::size_t bodies : {64U, 1024U, 16384U, 1048576U}) {
+      if (!all_sizes && bodies != 1024) continue;
+      if (quick_ && bodies > 16384) continue;
+      add(Problem::name, method, "packs", bodies, 1, rate<Problem, Method>(bodies, 1), operations);
+    }
+    if (all_sizes && cores > 1) {
+      const std::size_t bodies = quick_ ? 16384 : 1048576;
+      add(Problem::name, method, "packs", bodies, cores, rate<Problem, Method>(bodies, cores),
+          operations);
+    }
+  }
+
+  void eigen(const char* problem, EigenResult (*run)(std::size_t, int, int)) {
+    for (const std::size_t bodies : {64U, 1024U}) {
+      const int steps = steps_for(bodies);
+      add(problem, "rk4", "Eigen", bodies, 1, run(bodies, steps, runs(bodies)).steps_per_second, 0);
+    }
+  }
+
+  /// Whether Eigen's bodies move as ours, relative to |Π|.
+  template <class Problem>
+  [[nodiscard]] static double disagreement(EigenResult (*run)(std::size_t, int, int)) {
+    const auto system = Problem::template system<double>();
+    using System = std::remove_cvref_t<decltype(system)>;
+    auto state = member<System>(0);
+    Rk4<System> method;
+    for (int k = 0; k < 100; ++k) method.do_step(system, state, 0.0, step);
+    const auto theirs = run(1, 100, 1).angular;
+    const auto ours = state.momenta[0].components();
+    double apart = 0;
+    for (std::size_t k = 0; k < 3; ++k) apart = std::max(apart, std::abs(theirs[k] - ours[k]));
+    return apart;
+  }
+
+  void note_peak() { peak_ = std::max(peak_, peak()); }
+
+  void print(double disagreement) const {
+    std::printf(
+        "{\"lanes\": %zu, \"isa\": \"%s\", \"cores\": %u, \"peak_flops\": %.6g, "
+        "\"disagreement\": %.3g,\n \"rows\": [\n%s]}\n",
+        Lanes::lanes, std::string(hamotor::instruction_set).c_str(),
+        std::thread::hardware_concurrency(), peak_, disagreement, rows_.c_str());
+  }
+
+ private:
+  [[nodiscard]] static int steps_for(std::size_t bodies) {
+    return bodies > 100000 ? 32 : bodies > 4096 ? 64 : static_cast<int>(131072 / bodies);
+  }
+  [[nodiscard]] int runs(std::size_t bodies) const {
+    return bodies > 100000 ? 3 : bodies > 4096 ? 10 : quick_ ? 20 : 100;
+  }
+
+  template <class Problem, template <class> class Method>
+  [[nodiscard]] double rate(std::size_t bodies, unsigned threads) {
+    const auto system = Problem::template system<Lanes>();
+    using System = std::remove_cvref_t<decltype(system)>;
+    using Ensemble = hamotor::Ensemble<System, Method<System>>;
+    std::vector<typename Ensemble::Member> members;
+    for (std::size_t k = 0; k < bodies; ++k) members.push_back(member<System>(k));
+    Ensemble ensemble(system, Method<System>{}, 0.0, step, members, threads);
+    const int steps = steps_for(bodies);
+    const double taken = shortest(runs(bodies), [&] {
+      if (ensemble.advance(steps) != bodies) std::fprintf(stderr, "a body failed\n");
+    });
+    note_peak();
+    return static_cast<double>(bodies) * steps / taken;
+  }
+
+  void add(const char* problem, const char* method, const char* contestant, std::size_t bodies,
+           unsigned threads, double rate, double operations) {
+    std::array<char, 512> text{};
+    std::snprintf(text.data(), text.size(),
+                  "%s  {\"problem\": \"%s\", \"method\": \"%s\", \"contestant\": \"%s\", "
+                  "\"bodies\": %zu, \"threads\": %u, \"steps_per_second\": %.6g, "
+                  "\"flops_per_step\": %.4g}",
+                  rows_.empty() ? "" : ",\n", problem, method, contestant, bodies, threads, rate,
+                  operations);
+    rows_ += text.data();
+  }
+
+  bool quick_;
+  double peak_ = 0;
+  std::string rows_;
+};
+
+void run(bool quick) {
+  Report report(quick);
+  report.note_peak();
+  report.measure<FreeRotation, Rk4>("rk4", true);
+  report.eigen(FreeRotation::name, eigen_free);
+  report.measure<Spring, Rk4>("rk4", true);
+  report.eigen(Spring::name, eigen_spring);
+  report.measure<FreeMotion, Rk4>("rk4", false);
+  report.measure<FreeRotation, Strang>("splitting2, plain sums", true);
+  report.measure<FreeRotation, StrangCompensated>("splitting2", false);
+  report.measure<FreeRotation, Order4>("splitting4, plain sums", false);
+  report.measure<Spring, Strang>("splitting2, plain sums", false);
+  report.measure<Spring, StrangCompensated>("splitting2", false);
+  report.measure<Spring, Order4>("splitting4, plain sums", false);
+  report.print(std::max(Report::disagreement<FreeRotation>(eigen_free),
+                        Report::disagreement<Spring>(eigen_spring)));
+}
+
+}  // namespace
+}  // namespace bench
+
+int main(int count, char** words) {
+  bench::run(count > 1 && std::strcmp(words[1], "--quick") == 0);
+  return 0;
+}
