@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.bench.precision import peers
+from tests.bench.precision import peers, stopwatch
 
 from hamotor.bench import endpoint, solvers
 from hamotor.bench.contest import Extent
@@ -271,3 +271,34 @@ def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str, tmp_path: 
     for who, row in rows.items():
         here = endpoint.of_quaternion(problem(name).scene, row["final"])
         assert endpoint.errors(here, expected)[ATTITUDE] < (0.3 if who == "Bullet" else 1e-2), who
+
+
+def test_a_long_run_that_explodes_is_a_row_that_says_when() -> None:
+    given = problem("P1").for_peers
+    assert not isinstance(given, str)
+
+    start = given["state"][4]
+
+    class Exploding:
+        """Numbers for two intervals."""
+
+        def __init__(self, problem: peers.Problem, setting: float) -> None:
+            self.problem = problem
+
+        def run(self, repetitions: int) -> peers.Result:
+            watch = peers.Watch()
+            watch.time(lambda: None)
+            done = self.problem.state[4] - start + 1
+            state = [*self.problem.state[:4], self.problem.state[4] + 1, 0.0, 0.0]
+            return peers.Result(watch, state if done < 2.5 else [float("nan")] * 7, 1, 1)
+
+    asked = {
+        "kind": "exploding", "options": {}, "tolerance": 0.0, "every": 5, "step": 0.1,
+        "samples": 4, "longest_s": 1e9,
+    }  # fmt: skip
+    makers = {"exploding": Exploding}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(peers, "MAKERS", makers)
+        said = stopwatch.long_run(asked, given)
+    assert said["failure"] == "not finite after 10 steps"
+    assert len(said["states"]) == 2

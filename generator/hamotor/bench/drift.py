@@ -42,8 +42,8 @@ class Drift:
     step: float
     """Of fixed steps; others took as many as their tolerance wants for `steps` of these."""
     quantity: str
-    largest: float
-    """Relative, of all samples; of the attitude in radians."""
+    largest: float | None
+    """Relative, of all samples; of the attitude in radians.  None where there is no sample."""
     exponent: float | None
     """p in error ∝ steps^p, fitted to the largest error so far over the last two decades."""
     exponent_error: float | None
@@ -144,9 +144,11 @@ def drifts(
 
     `rows`: after each `every` steps, which take `interval`, s.
     """
+    if not len(rows):
+        return [replace(about, quantity=conserved.description.conserved[0].name)]
     counts = every * np.arange(1.0, len(rows) + 1)
     errors = dict(_relative_errors(conserved.description, conserved.start(), rows))
-    exact = conserved.exact(interval, len(rows)) if len(rows) else None
+    exact = conserved.exact(interval, len(rows))
     if exact is not None:
         errors[ATTITUDE] = _angles(conserved.description, rows, exact)
     return [_fitted(about, quantity, counts, error) for quantity, error in errors.items()]
@@ -158,14 +160,13 @@ def _fitted(about: Drift, quantity: str, counts: Rows, error: Rows) -> Drift:
     if quantity == ATTITUDE:  # no line where it has come round
         fitted = largest[: int(np.searchsorted(largest, _TURNED))]
     exponent, doubt = _growth(counts[: len(fitted)], fitted)
-    points = _spread(counts) if len(counts) else np.zeros(0, int)
     return replace(
         about,
         quantity=quantity,
-        largest=float(largest[-1]) if len(largest) else 0.0,
+        largest=float(largest[-1]),
         exponent=exponent,
         exponent_error=doubt,
-        curve=[(float(counts[i]), float(largest[i])) for i in points],
+        curve=[(float(counts[i]), float(largest[i])) for i in _spread(counts)],
     )
 
 
@@ -187,7 +188,7 @@ def _relative_errors(description: Description, start: Rows, rows: Rows) -> Mappi
     for quantity in description.conserved:
         norm = np.linalg.norm([start[index[column]] for column in quantity.norm] or [0.0])
         scale: Any = float(norm) or quantity.scale
-        if scale and len(rows):
+        if scale:
             column = index[quantity.column]
             found[quantity.name] = np.abs(rows[:, column] - start[column]) / scale
     return found

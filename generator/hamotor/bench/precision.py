@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from hamotor.bench import endpoint, solvers
-from hamotor.bench.account import provenance, say
+from hamotor.bench.account import provenance, publish, say
 from hamotor.bench.contest import (
     OWN,
     Contestant,
@@ -93,7 +93,7 @@ def bench_precision(
     if drift is not None:
         extent = replace(extent, drift=drift)
     account = measure([problem(name) for name in names], extent, peers, gaps)
-    _print(account, as_json=json)
+    publish(account, table, out=None, as_json=json)
     if out is not None:
         for file in write_report(account, out):
             say(f"wrote {file}")
@@ -168,10 +168,6 @@ def measure(
     return {**account, "best": standings(account)}
 
 
-def _print(account: Mapping[str, Any], *, as_json: bool) -> None:
-    print(json.dumps(account, indent=1, allow_nan=False) if as_json else table(account), flush=True)
-
-
 def _longest_s(steps: int) -> float:
     return max(_LONGEST_RUN_S, 0.1 * _LONGEST_RUN_S * steps / 1e6)
 
@@ -201,7 +197,7 @@ def _long_runs(
         step = step_of(simulation)
         failure = None if done == affordable else f"stopped after {done:,} steps"
         about = Drift(
-            c.problem, c.name, c.family, done, step, "", 0.0, None, None, seconds, failure=failure
+            c.problem, c.name, c.family, done, step, "", None, None, None, seconds, failure=failure
         )
         found += drifts(about, of, every, every * Fraction(step), rows)
     for index, said in states.items():
@@ -215,7 +211,7 @@ def _long_runs(
             steps=every * len(rows),
             step=step,
             quantity="",
-            largest=0.0,
+            largest=None,
             exponent=None,
             exponent_error=None,
             seconds=said.get("seconds", 0.0),

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from hamotor.bench.endpoint import ATTITUDE
 from hamotor.bench.solvers import TUNED
+from hamotor.run.report import to_json
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -174,12 +175,13 @@ def _long_runs(drift: Rows) -> list[str]:
     for row in drift:
         if row["quantity"] not in ("energy", ATTITUDE):
             continue
+        largest = "-" if row["largest"] is None else f"{row['largest']:.1e}"
         grown = "-"
         if row["exponent"] is not None:
             grown = f"{row['exponent']:.2f} ± {row['exponent_error']:.2f}"
         lines.append(
             f"  {row['problem']:<12}{row['contestant']:<22}{row['steps']:>12,} steps of"
-            f" {row['step']:g} s  {row['quantity'].split()[0]:<9}{row['largest']:>9.1e}"
+            f" {row['step']:g} s  {row['quantity'].split()[0]:<9}{largest:>9}"
             f"   p = {grown}" + (f"; {row['failure']}" if row["failure"] else "")
         )
     return lines
@@ -198,10 +200,10 @@ def write_report(account: Mapping[str, Any], out: Path) -> list[Path]:
     Returns the files.  The page holds the whole account and needs no network.
     """
     out.mkdir(parents=True, exist_ok=True)
-    # A browser reads no NaN.
-    whole = json.dumps(account, allow_nan=False)
+    text = to_json(account)  # a browser reads no NaN
     files = [out / "precision.json", out / "precision.html"]
-    files[0].write_text(json.dumps(account, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    files[0].write_text(text, encoding="utf-8")
+    whole = json.dumps(json.loads(text))
     # What a script element holds ends at its first end tag, in a string or not.
     page = _PAGE.read_text(encoding="utf-8").replace("@ACCOUNT@", whole.replace("</", "<\\/"))
     files[1].write_text(page, encoding="utf-8")

@@ -14,6 +14,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -144,6 +145,8 @@ def long_run(asked: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any
                 continue
             for _ in range(asked["samples"]):
                 problem.state = timed.run(1).state
+                if not all(map(isfinite, problem.state)):
+                    raise peers.Refused(f"not finite after {len(states) * every:,} steps")
                 states.append(problem.state)
     except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as met:
         return {"every": every, "states": states, "failure": str(met)}
