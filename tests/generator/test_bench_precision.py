@@ -282,10 +282,10 @@ def test_a_long_run_that_explodes_is_a_row_that_says_when() -> None:
     class Exploding:
         """Numbers for two intervals."""
 
-        def __init__(self, problem: peers.Problem, setting: float) -> None:
+        def __init__(self, problem: peers.Problem, _: float) -> None:
             self.problem = problem
 
-        def run(self, repetitions: int) -> peers.Result:
+        def run(self, _: int) -> peers.Result:
             watch = peers.Watch()
             watch.time(lambda: None)
             done = self.problem.state[4] - start + 1
