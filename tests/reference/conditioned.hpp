@@ -471,11 +471,18 @@ class Run {
           for (std::size_t k = 0; k < x.size(); ++k)
             if (weights[k] == weights[j]) largest = std::max(largest, std::fabs(x[k]));
           if (largest == 0) continue;
-          Numbers moved = x;
-          moved[j] += step * largest;
-          const auto there = exact(moved, Wide());
-          for (std::size_t i = 0; i < change.size(); ++i)
-            change[i] += std::fabs(there[i] - here[i]) / step;
+          // both ways: one of them may lead across a cut
+          std::vector<Wide> most(change.size());
+          for (const Wide way : {step, -step}) {
+            Numbers moved = x;
+            moved[j] += way * largest;
+            const auto there = exact(moved, Wide());
+            for (std::size_t i = 0; i < change.size(); ++i) {
+              const Wide moves = std::fabs(there[i] - here[i]) / step;
+              if (!(moves <= most[i])) most[i] = moves;  // also what is no number
+            }
+          }
+          for (std::size_t i = 0; i < change.size(); ++i) change[i] += most[i];
         }
         const Wide size = norm(truth);
         const Wide condition = norm(change);

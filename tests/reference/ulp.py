@@ -1,7 +1,8 @@
 """The accuracy of exp, log, Cayley's maps and normalize for every finite input, measured.
 
 `PYTHONPATH=generator .hamotor/venv/bin/python -m tests.reference.ulp` measures it and writes the
-table in ulp.md; with `--json` it prints the measurements instead.
+table in ulp.md; with names of algebras, only their rows of the second table; with `--json` it
+prints the measurements instead.
 
 ulp.cpp measures against quadruple precision in classical form; `worst_disagreement` holds that
 reference against this module's own: power series and linear equations for multivectors, products
@@ -271,7 +272,8 @@ def introduction(points: int) -> str:
     """What the table says and how it was made."""
     return f"""# Accuracy of the generated kernels
 
-Written by `PYTHONPATH=generator .hamotor/venv/bin/python -m tests.reference.ulp`.
+Written by `PYTHONPATH=generator .hamotor/venv/bin/python -m tests.reference.ulp`; with names of
+algebras behind it, only their rows of the second table.
 
 ## exp, log, Cayley's maps and normalize for every finite input
 
@@ -293,11 +295,20 @@ is quadruple precision, which is itself held against multivectors with 100 digit
 
 def main() -> None:
     """Measure, and write the table or print the measurements."""
-    found = measurements(POINTS, fused=processor_can_fuse())
+    fused = processor_can_fuse()
+    if algebras := [name for name in sys.argv[1:] if name in conditioned.ALGEBRAS]:
+        whole = TABLE.read_text(encoding="utf-8")
+        first, heading, _ = conditioned.introduction().partition("\n")
+        kept, _, before = whole.partition(first + heading)
+        each = conditioned.measurements(POINTS, fused=fused, algebras=algebras)
+        parts = [conditioned.introduction(), conditioned.table(each, before) + "\n"]
+        TABLE.write_text(kept + "\n".join(parts), encoding="utf-8")
+        return
+    found = measurements(POINTS, fused=fused)
     if "--json" in sys.argv[1:]:
         json.dump([m.__dict__ for m in found], sys.stdout, indent=1)
         return
-    each = conditioned.measurements(POINTS, fused=processor_can_fuse())
+    each = conditioned.measurements(POINTS, fused=fused)
     parts = [introduction(POINTS), table(found) + "\n"]
     parts += [conditioned.introduction(), conditioned.table(each) + "\n"]
     TABLE.write_text("\n".join(parts), encoding="utf-8")

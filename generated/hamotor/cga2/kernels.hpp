@@ -328,25 +328,25 @@ template <class S>
   const S c_e1 = dot(m.e12, v.e2, -m.e1i, v.e0, m.e01, v.ei);
   const S c_e2 = dot(-m.e12, v.e1, -m.e2i, v.e0, m.e02, v.ei);
   const S c_e012 = m.e012i * v.e0;
-  const S c_ei = dot(-m.e1i, v.e1, -m.e2i, v.e2, m.e0i, v.ei);
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2);
   const S c_e01i = m.e012i * v.e2;
   const S c_e02i = m.e012i * v.e1;
   const S c_e12i = m.e012i * v.ei;
   return {.e0 = mul_add(S(2),
-                        dot(c_e0, m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02, -c_e012, m.e12,
-                            c_e012, m.e012i, -c_e01i, m.e01, c_e02i, m.e02),
+                        dot(-c_e012, m.e12, c_e012, m.e012i, -c_e01i, m.e01, c_e02i, m.e02, c_e0,
+                            m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02),
                         v.e0),
           .e1 = mul_add(S(2),
-                        dot(-c_e0, m.e1i, c_e1, m.s, c_e2, m.e12, c_e012, m.e2i, c_ei, m.e01,
-                            -c_e01i, m.e0i, c_e02i, m.e012i, c_e12i, m.e02),
+                        dot(-c_e01i, m.e0i, c_e02i, m.e012i, c_e012, m.e2i, c_e12i, m.e02, c_e1,
+                            m.s, c_e2, m.e12, -c_e0, m.e1i, c_ei, m.e01),
                         v.e1),
           .e2 = mul_add(S(2),
-                        dot(-c_e0, m.e2i, -c_e1, m.e12, c_e2, m.s, -c_e012, m.e1i, c_ei, m.e02,
-                            c_e01i, m.e012i, c_e02i, m.e0i, -c_e12i, m.e01),
+                        dot(c_e01i, m.e012i, c_e02i, m.e0i, -c_e012, m.e1i, -c_e12i, m.e01, -c_e1,
+                            m.e12, c_e2, m.s, -c_e0, m.e2i, c_ei, m.e02),
                         v.e2),
           .ei = mul_add(S(2),
-                        dot(-c_e1, m.e1i, -c_e2, m.e2i, c_ei, m.s, c_ei, m.e0i, -c_e01i, m.e1i,
-                            c_e02i, m.e2i, c_e12i, m.e12, c_e12i, m.e012i),
+                        dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e01i, m.e1i, c_e02i, m.e2i, c_ei,
+                            m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i),
                         v.ei)};
 }
 
@@ -361,23 +361,23 @@ template <class S>
   const S c_e02 = dot(-b.e01, m.e12, -b.e02, m.e0i, b.e12, m.e01, b.e0i, m.e02);
   const S c_e12 = dot(-b.e02, m.e1i, b.e01, m.e2i, -b.e2i, m.e01, b.e1i, m.e02);
   const S c_e0i = dot(-b.e01, m.e1i, -b.e02, m.e2i, b.e1i, m.e01, b.e2i, m.e02);
-  const S c_e1i = dot(b.e2i, m.e12, -b.e0i, m.e1i, -b.e12, m.e2i, b.e1i, m.e0i);
-  const S c_e2i = dot(-b.e1i, m.e12, b.e12, m.e1i, -b.e0i, m.e2i, b.e2i, m.e0i);
+  const S c_e1i = dot(b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i);
+  const S c_e2i = dot(-b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i);
   return {
       .e12 = mul_add(
           S(2),
-          dot(c_e01, m.e2i, -c_e02, m.e1i, c_e12, m.s, c_e0i, m.e012i, c_e1i, m.e02, -c_e2i, m.e01),
+          dot(c_e12, m.s, c_e0i, m.e012i, c_e01, m.e2i, -c_e02, m.e1i, c_e1i, m.e02, -c_e2i, m.e01),
           b.e12),
       .e1i = mul_add(
           S(2),
-          dot(-c_e12, m.e2i, -c_e0i, m.e1i, c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i),
+          dot(c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e12, m.e2i, -c_e0i, m.e1i),
           b.e1i),
       .e2i = mul_add(S(2),
-                     dot(c_e12, m.e1i, -c_e0i, m.e2i, -c_e1i, m.e12, -c_e1i, m.e012i, c_e2i, m.s,
-                         c_e2i, m.e0i),
+                     dot(-c_e1i, m.e12, -c_e1i, m.e012i, c_e2i, m.s, c_e2i, m.e0i, c_e12, m.e1i,
+                         -c_e0i, m.e2i),
                      b.e2i),
       .e0i = mul_add(S(2),
-                     dot(-c_e01, m.e1i, -c_e02, m.e2i, -c_e12, m.e012i, c_e0i, m.s, c_e1i, m.e01,
+                     dot(-c_e12, m.e012i, c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, c_e1i, m.e01,
                          c_e2i, m.e02),
                      b.e0i),
       .e01 = mul_add(S(2),
@@ -401,22 +401,22 @@ template <class S>
   const S c_e1 = dot(m.e12, v.e2, -m.e1i, v.e0);
   const S c_e2 = dot(m.e12, v.e1, m.e2i, v.e0);
   const S c_e012 = m.e012i * v.e0;
-  const S c_ei = dot(-m.e1i, v.e1, -m.e2i, v.e2, m.e0i, v.ei);
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2);
   const S c_e01i = m.e012i * v.e2;
   const S c_e02i = m.e012i * v.e1;
   const S c_e12i = m.e012i * v.ei;
   return {.e0 = mul_add(S(2), dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i), v.e0),
           .e1 = mul_add(S(2),
-                        dot(c_e0, m.e1i, c_e1, m.s, -c_e2, m.e12, c_e012, m.e2i, -c_e01i, m.e0i,
-                            c_e02i, m.e012i),
+                        dot(-c_e01i, m.e0i, c_e02i, m.e012i, c_e0, m.e1i, c_e012, m.e2i, c_e1, m.s,
+                            -c_e2, m.e12),
                         v.e1),
           .e2 = mul_add(S(2),
-                        dot(c_e0, m.e2i, -c_e1, m.e12, -c_e2, m.s, -c_e012, m.e1i, c_e01i, m.e012i,
-                            c_e02i, m.e0i),
+                        dot(c_e01i, m.e012i, c_e02i, m.e0i, c_e0, m.e2i, -c_e012, m.e1i, -c_e1,
+                            m.e12, -c_e2, m.s),
                         v.e2),
           .ei = mul_add(S(2),
-                        dot(-c_e1, m.e1i, c_e2, m.e2i, c_ei, m.s, c_ei, m.e0i, -c_e01i, m.e1i,
-                            c_e02i, m.e2i, c_e12i, m.e12, c_e12i, m.e012i),
+                        dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e01i, m.e1i, c_e02i, m.e2i, -c_e1,
+                            m.e1i, c_e2, m.e2i, c_ei, m.s, c_ei, m.e0i),
                         v.ei)};
 }
 
@@ -431,17 +431,17 @@ template <class S>
   const S c_e02 = dot(b.e01, m.e12, b.e02, m.e0i);
   const S c_e12 = dot(-b.e02, m.e1i, b.e01, m.e2i);
   const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i);
-  const S c_e1i = dot(b.e2i, m.e12, -b.e0i, m.e1i, -b.e12, m.e2i, b.e1i, m.e0i);
-  const S c_e2i = dot(-b.e1i, m.e12, b.e12, m.e1i, -b.e0i, m.e2i, b.e2i, m.e0i);
+  const S c_e1i = dot(b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i);
+  const S c_e2i = dot(-b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i);
   return {
       .e12 = mul_add(S(2), dot(c_e01, m.e2i, c_e02, m.e1i, c_e12, m.s, -c_e0i, m.e012i), b.e12),
       .e1i = mul_add(
           S(2),
-          dot(-c_e12, m.e2i, c_e0i, m.e1i, c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i),
+          dot(c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e12, m.e2i, c_e0i, m.e1i),
           b.e1i),
       .e2i = mul_add(
           S(2),
-          dot(c_e12, m.e1i, c_e0i, m.e2i, -c_e1i, m.e12, -c_e1i, m.e012i, c_e2i, m.s, c_e2i, m.e0i),
+          dot(-c_e1i, m.e12, -c_e1i, m.e012i, c_e2i, m.s, c_e2i, m.e0i, c_e12, m.e1i, c_e0i, m.e2i),
           b.e2i),
       .e0i = mul_add(S(2), dot(-c_e01, m.e1i, c_e02, m.e2i, -c_e12, m.e012i, -c_e0i, m.s), b.e0i),
       .e01 = mul_add(S(2), dot(c_e01, m.s, -c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i), b.e01),
@@ -461,7 +461,7 @@ template <class S>
   return {.e0 = v.e0,
           .e1 = mul_add(S(2), dot(c_e1, m.s, -c_e2, m.e12), v.e1),
           .e2 = mul_add(S(-2), dot(c_e1, m.e12, c_e2, m.s), v.e2),
-          .ei = mul_add(S(2), dot(-c_e1, m.e1i, c_e2, m.e2i, -c_ei, m.s), v.ei)};
+          .ei = mul_add(S(2), dot(-c_ei, m.s, -c_e1, m.e1i, c_e2, m.e2i), v.ei)};
 }
 
 /// sandwich: Motor Point -> Point
@@ -473,8 +473,8 @@ template <class S>
                                                          const Point<S>& x) noexcept {
   const S y_e1 = dot(-m.e1i, m.s, x.e1, m.e12, x.e2);
   const S y_e2 = dot(-m.e2i, -m.e12, x.e1, m.s, x.e2);
-  return {.e1 = mul_add(S(2), dot(m.e12, y_e2, -m.e1i, m.s), x.e1),
-          .e2 = mul_add(S(-2), dot(m.e12, y_e1, m.e2i, m.s), x.e2),
+  return {.e1 = mul_add(S(2), dot(-m.e1i, m.s, m.e12, y_e2), x.e1),
+          .e2 = mul_add(S(-2), dot(m.e2i, m.s, m.e12, y_e1), x.e2),
           .ei = mul_add(S(-2), dot(m.e1i, y_e1, m.e2i, y_e2), x.ei)};
 }
 
@@ -723,7 +723,7 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 30 mul, 14 add (9 fused), 4 div, 1 length, 2 select, 1 sqrt.
+/// Cost: 30 mul, 13 add (9 fused), 4 div, 1 abs, 1 length, 2 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(
@@ -731,8 +731,8 @@ template <class S>
       dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
           (S(1) - m.s));
   const S radius = scalar::length(shifted, m.e012i);
-  const S root = scalar::sqrt(
-      select(shifted > S(0), shifted + radius, m.e012i * m.e012i / (radius - shifted)));
+  const S total = scalar::abs(shifted) + radius;
+  const S root = scalar::sqrt(select(shifted > S(0), total, m.e012i * m.e012i / total));
   const S per_root = S(0.5) / root;
   const S inverse = S(1) / radius;
   const S factor = S(0.5) * (root * inverse);
@@ -750,14 +750,14 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 21 mul, 10 add (6 fused), 4 div, 1 length, 2 select, 1 sqrt.
+/// Cost: 21 mul, 9 add (6 fused), 4 div, 1 abs, 1 length, 2 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i) / (S(1) - m.s));
   const S radius = scalar::length(shifted, m.e012i);
-  const S root = scalar::sqrt(
-      select(shifted > S(0), shifted + radius, m.e012i * m.e012i / (radius - shifted)));
+  const S total = scalar::abs(shifted) + radius;
+  const S root = scalar::sqrt(select(shifted > S(0), total, m.e012i * m.e012i / total));
   const S per_root = S(0.5) / root;
   const S inverse = S(1) / radius;
   const S factor = S(0.5) * (root * inverse);
@@ -871,7 +871,7 @@ template <class S>
 
 /// normalize: Versor -> Versor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 32 mul, 18 add (15 fused), 2 div, 2 sqrt.
+/// Cost: 33 mul, 18 add (15 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> normalize(const Versor<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12, m.e02, m.e1i, -m.e01, m.e2i);
@@ -879,7 +879,8 @@ template <class S>
                        dot(m.e01, m.e1i, m.e02, m.e2i));
   const S omega = q_e012i * q_e012i;
   const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
+  const S total = scalar::abs(square) + radius;
+  const S root = scalar::sqrt(S(0.5) * select(square > S(0), total, S(4) * omega / total));
   const S factor = root / radius;
   const S turn = -q_e012i / (root * radius);
   return {.s = dot(factor, m.s, turn, -m.e012i),
@@ -894,14 +895,15 @@ template <class S>
 
 /// normalize: Similarity -> Similarity
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 23 mul, 12 add (10 fused), 2 div, 2 sqrt.
+/// Cost: 24 mul, 12 add (10 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> normalize(const Similarity<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12);
   const S square = dot(m.s, m.s, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i);
   const S omega = q_e012i * q_e012i;
   const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
+  const S total = scalar::abs(square) + radius;
+  const S root = scalar::sqrt(S(0.5) * select(square > S(0), total, S(4) * omega / total));
   const S factor = root / radius;
   const S turn = -q_e012i / (root * radius);
   return {.s = dot(factor, m.s, turn, -m.e012i),

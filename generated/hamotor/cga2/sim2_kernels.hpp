@@ -65,8 +65,8 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr sim2::Rate<S> Ad(const Similarity<S>& m,
                                                         const sim2::Rate<S>& w) noexcept {
-  const S c_e1i = dot(-m.e12, w.v2, -m.e1i, w.d, m.e2i, w.w12, -m.e0i, w.v1);
-  const S c_e2i = dot(m.e12, w.v1, -m.e1i, w.w12, -m.e2i, w.d, -m.e0i, w.v2);
+  const S c_e1i = dot(-m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12);
+  const S c_e2i = dot(m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d);
   return {.w12 = w.w12,
           .v1 = mul_add(S(-2), dot(c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i), w.v1),
           .v2 = mul_add(S(2), dot(c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i), w.v2),

@@ -83,22 +83,22 @@ template <class S>
   const S c_e02 = dot(m.e12, w.u1, m.e0i, w.u2, -m.e01, w.w12, m.e02, w.d);
   const S c_e12 = dot(m.e1i, w.u2, -m.e2i, w.u1, m.e01, w.v2, -m.e02, w.v1);
   const S c_e0i = dot(m.e1i, w.u1, m.e2i, w.u2, -m.e01, w.v1, -m.e02, w.v2);
-  const S c_e1i = dot(-m.e12, w.v2, -m.e1i, w.d, m.e2i, w.w12, -m.e0i, w.v1);
-  const S c_e2i = dot(m.e12, w.v1, -m.e1i, w.w12, -m.e2i, w.d, -m.e0i, w.v2);
+  const S c_e1i = dot(-m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12);
+  const S c_e2i = dot(m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d);
   return {.w12 = mul_add(S(2),
-                         dot(-c_e01, m.e2i, c_e02, m.e1i, -c_e12, m.s, -c_e0i, m.e012i, -c_e1i,
+                         dot(-c_e12, m.s, -c_e0i, m.e012i, -c_e01, m.e2i, c_e02, m.e1i, -c_e1i,
                              m.e02, c_e2i, m.e01),
                          w.w12),
           .v1 = mul_add(S(2),
-                        dot(c_e12, m.e2i, c_e0i, m.e1i, -c_e1i, m.s, -c_e1i, m.e0i, -c_e2i, m.e12,
-                            -c_e2i, m.e012i),
+                        dot(-c_e1i, m.s, -c_e1i, m.e0i, -c_e2i, m.e12, -c_e2i, m.e012i, c_e12,
+                            m.e2i, c_e0i, m.e1i),
                         w.v1),
           .v2 = mul_add(S(2),
-                        dot(-c_e12, m.e1i, c_e0i, m.e2i, c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s,
-                            -c_e2i, m.e0i),
+                        dot(c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
+                            c_e0i, m.e2i),
                         w.v2),
           .d = mul_add(S(2),
-                       dot(-c_e01, m.e1i, -c_e02, m.e2i, -c_e12, m.e012i, c_e0i, m.s, c_e1i, m.e01,
+                       dot(-c_e12, m.e012i, c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, c_e1i, m.e01,
                            c_e2i, m.e02),
                        w.d),
           .u1 = mul_add(S(2),
@@ -122,11 +122,11 @@ template <class S>
   const S c_e02 = dot(m.e12, mu.p2, -m.e0i, mu.p1, m.e01, mu.q, -m.e02, mu.l12);
   const S c_e12 = dot(-m.e1i, mu.p1, -m.e2i, mu.p2, m.e01, mu.k1, m.e02, mu.k2);
   const S c_e0i = dot(m.e1i, mu.p2, -m.e2i, mu.p1, m.e01, mu.k2, -m.e02, mu.k1);
-  const S c_e1i = dot(-m.e12, mu.k1, m.e1i, mu.l12, -m.e2i, mu.q, m.e0i, mu.k2);
-  const S c_e2i = dot(-m.e12, mu.k2, m.e1i, mu.q, m.e2i, mu.l12, -m.e0i, mu.k1);
+  const S c_e1i = dot(-m.e12, mu.k1, m.e0i, mu.k2, m.e1i, mu.l12, -m.e2i, mu.q);
+  const S c_e2i = dot(-m.e12, mu.k2, -m.e0i, mu.k1, m.e1i, mu.q, m.e2i, mu.l12);
   return {
       .l12 = mul_add(S(2),
-                     dot(c_e01, m.e1i, c_e02, m.e2i, c_e12, m.e012i, -c_e0i, m.s, -c_e1i, m.e01,
+                     dot(c_e12, m.e012i, -c_e0i, m.s, c_e01, m.e1i, c_e02, m.e2i, -c_e1i, m.e01,
                          -c_e2i, m.e02),
                      mu.l12),
       .p1 = mul_add(
@@ -139,15 +139,15 @@ template <class S>
                     mu.p2),
       .q = mul_add(
           S(2),
-          dot(c_e01, m.e2i, -c_e02, m.e1i, c_e12, m.s, c_e0i, m.e012i, c_e1i, m.e02, -c_e2i, m.e01),
+          dot(c_e12, m.s, c_e0i, m.e012i, c_e01, m.e2i, -c_e02, m.e1i, c_e1i, m.e02, -c_e2i, m.e01),
           mu.q),
       .k1 = mul_add(S(2),
-                    dot(-c_e12, m.e1i, c_e0i, m.e2i, c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s,
-                        -c_e2i, m.e0i),
+                    dot(c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
+                        c_e0i, m.e2i),
                     mu.k1),
       .k2 = mul_add(
           S(2),
-          dot(-c_e12, m.e2i, -c_e0i, m.e1i, c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i),
+          dot(c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e12, m.e2i, -c_e0i, m.e1i),
           mu.k2)};
 }
 

@@ -466,7 +466,7 @@ template <class S>
 
 /// gp: Bivector Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 100 mul, 84 add (68 fused).  Sparsity: 82 of 100 pairs of components.
+/// Cost: 100 mul, 84 add (66 fused).  Sparsity: 82 of 100 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Bivector<S>& a, const Bivector<S>& b) noexcept {
   return {
@@ -506,7 +506,7 @@ template <class S>
 
 /// gp: Bivector Trivector -> Odd
 /// a b, the geometric product.
-/// Cost: 100 mul, 84 add (68 fused).  Sparsity: 82 of 100 pairs of components.
+/// Cost: 100 mul, 84 add (66 fused).  Sparsity: 82 of 100 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Odd<S> gp(const Bivector<S>& b, const Trivector<S>& t) noexcept {
   return {
@@ -753,7 +753,7 @@ template <class S>
 
 /// inner: Bivector Bivector -> Scalar
 /// the part of grade |i − j| of a b.
-/// Cost: 10 mul, 9 add (8 fused).  Sparsity: 10 of 100 pairs of components.
+/// Cost: 10 mul, 9 add (6 fused).  Sparsity: 10 of 100 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S inner(const Bivector<S>& a,
                                                const Bivector<S>& b) noexcept {
@@ -882,7 +882,7 @@ template <class S>
 /// sandwich: Versor Vector -> Vector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 120 mul, 100 add (90 fused).
+/// Cost: 120 mul, 100 add (80 fused).
 template <class S>
 [[nodiscard]] constexpr Vector<S> sandwich(const Versor<S>& m, const Vector<S>& v) noexcept {
   const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
@@ -893,48 +893,50 @@ template <class S>
   const S c_e013 = dot(m.e031i, v.e0, -m.e0123, v.e2);
   const S c_e023 = dot(-m.e023i, v.e0, m.e0123, v.e1);
   const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
-  const S c_ei = dot(-m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3, m.e0i, v.ei);
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
   const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
   const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
-  const S c_e12i = dot(-m.e123i, v.e3, m.e012i, v.ei);
+  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
   const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(m.e123i, v.e2, -m.e031i, v.ei);
-  const S c_e23i = dot(-m.e123i, v.e1, m.e023i, v.ei);
+  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
+  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
   return {
       .e0 =
           mul_add(S(2),
-                  dot(c_e0, m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02, c_e012, m.e12, -c_e012,
-                      m.e012i, c_e3, m.e03, -c_e013, m.e31, c_e013, m.e031i, c_e023, m.e23, -c_e023,
-                      m.e023i, c_e123, m.e0123, c_e01i, m.e01, c_e02i, m.e02, c_e03i, m.e03),
+                  dot(c_e012, m.e12, -c_e012, m.e012i, -c_e013, m.e31, c_e013, m.e031i, c_e023,
+                      m.e23, -c_e023, m.e023i, c_e01i, m.e01, c_e02i, m.e02, c_e03i, m.e03, c_e123,
+                      m.e0123, c_e0, m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02, c_e3, m.e03),
                   v.e0),
-      .e1 = mul_add(S(2),
-                    dot(-c_e0, m.e1i, c_e1, m.s, c_e2, m.e12, -c_e012, m.e2i, -c_e3, m.e31, -c_e013,
-                        m.e3i, -c_e023, m.e123i, c_e123, m.e23, c_ei, m.e01, c_e01i, m.e0i, c_e02i,
-                        m.e012i, c_e12i, m.e02, -c_e03i, m.e031i, c_e13i, m.e03, c_e23i, m.e0123),
-                    v.e1),
-      .e2 =
+      .e1 =
           mul_add(S(2),
-                  dot(-c_e0, m.e2i, -c_e1, m.e12, c_e2, m.s, c_e012, m.e1i, c_e3, m.e23, c_e013,
-                      m.e123i, -c_e023, m.e3i, c_e123, m.e31, c_ei, m.e02, -c_e01i, m.e012i, c_e02i,
-                      m.e0i, -c_e12i, m.e01, c_e03i, m.e023i, -c_e13i, m.e0123, c_e23i, m.e03),
-                  v.e2),
-      .e3 =
+                  dot(c_e01i, m.e0i, c_e02i, m.e012i, -c_e03i, m.e031i, c_e123, m.e23, -c_e012,
+                      m.e2i, -c_e013, m.e3i, -c_e023, m.e123i, c_e12i, m.e02, c_e13i, m.e03, c_e23i,
+                      m.e0123, c_e1, m.s, c_e2, m.e12, -c_e3, m.e31, -c_e0, m.e1i, c_ei, m.e01),
+                  v.e1),
+      .e2 = mul_add(
+          S(2),
+          dot(-c_e01i, m.e012i, c_e02i, m.e0i, c_e03i, m.e023i, c_e123, m.e31, c_e012, m.e1i,
+              c_e013, m.e123i, -c_e023, m.e3i, -c_e12i, m.e01, -c_e13i, m.e0123, c_e23i, m.e03,
+              -c_e1, m.e12, c_e2, m.s, c_e3, m.e23, -c_e0, m.e2i, c_ei, m.e02),
+          v.e2),
+      .e3 = mul_add(
+          S(2),
+          dot(c_e01i, m.e031i, -c_e02i, m.e023i, c_e03i, m.e0i, c_e123, m.e12, -c_e012, m.e123i,
+              c_e013, m.e1i, c_e023, m.e2i, c_e12i, m.e0123, -c_e13i, m.e01, -c_e23i, m.e02,
+              c_e1, m.e31, -c_e2, m.e23, c_e3, m.s, -c_e0, m.e3i, c_ei, m.e03),
+          v.e3),
+      .ei =
           mul_add(S(2),
-                  dot(-c_e0, m.e3i, c_e1, m.e31, -c_e2, m.e23, -c_e012, m.e123i, c_e3, m.s, c_e013,
-                      m.e1i, c_e023, m.e2i, c_e123, m.e12, c_ei, m.e03, c_e01i, m.e031i, -c_e02i,
-                      m.e023i, c_e12i, m.e0123, c_e03i, m.e0i, -c_e13i, m.e01, -c_e23i, m.e02),
-                  v.e3),
-      .ei = mul_add(S(2),
-                    dot(-c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i, -c_e123, m.e123i, c_ei, m.s, c_ei,
-                        m.e0i, c_e01i, m.e1i, c_e02i, m.e2i, c_e12i, m.e12, c_e12i, m.e012i, c_e03i,
-                        m.e3i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i, m.e23, c_e23i, m.e023i),
-                    v.ei)};
+                  dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i,
+                      m.e23, c_e23i, m.e023i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i, -c_e123,
+                      m.e123i, c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
+                  v.ei)};
 }
 
 /// sandwich: Versor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 240 mul, 215 add (190 fused).
+/// Cost: 240 mul, 215 add (170 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Versor<S>& m, const Bivector<S>& b) noexcept {
   const S c_e01 =
@@ -953,174 +955,174 @@ template <class S>
   const S c_e0i =
       dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, b.e1i, m.e01, b.e2i, m.e02, b.e3i, m.e03);
   const S c_e1i =
-      dot(-b.e3i, m.e31, b.e2i, m.e12, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i, b.e1i, m.e0i);
+      dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e2i, m.e0i);
-  const S c_e012i = dot(-b.e03, m.e123i, -b.e31, m.e023i, b.e23, m.e031i, b.e3i, m.e0123);
+      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i, b.e3i, m.e0123);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i, b.e3i, m.e0i);
-  const S c_e013i = dot(b.e02, m.e123i, -b.e12, m.e023i, b.e23, m.e012i, -b.e2i, m.e0123);
-  const S c_e023i = dot(-b.e01, m.e123i, -b.e12, m.e031i, b.e31, m.e012i, b.e1i, m.e0123);
-  const S c_e123i = dot(-b.e0i, m.e123i, b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i);
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
+  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i, -b.e2i, m.e0123);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i, b.e1i, m.e0123);
+  const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
   return {.e23 = mul_add(
               S(2),
-              dot(-c_e01, m.e123i, c_e02, m.e3i, -c_e12, m.e31, -c_e03, m.e2i, -c_e13, m.e12, c_e23,
-                  m.s, c_e0123, m.e1i, c_e0i, m.e023i, -c_e1i, m.e0123, c_e2i, m.e03, c_e012i,
-                  m.e031i, -c_e3i, m.e02, c_e013i, m.e012i, -c_e023i, m.e0i, c_e123i, m.e01),
+              dot(c_e012i, m.e031i, c_e013i, m.e012i, -c_e023i, m.e0i, c_e0123, m.e1i, c_e123i,
+                  m.e01, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s, c_e0i, m.e023i, -c_e01, m.e123i,
+                  c_e02, m.e3i, -c_e03, m.e2i, -c_e1i, m.e0123, c_e2i, m.e03, -c_e3i, m.e02),
               b.e23),
           .e31 = mul_add(
               S(2),
-              dot(-c_e01, m.e3i, -c_e02, m.e123i, c_e12, m.e23, c_e03, m.e1i, -c_e13, m.s, -c_e23,
-                  m.e12, c_e0123, m.e2i, c_e0i, m.e031i, -c_e1i, m.e03, -c_e2i, m.e0123, -c_e012i,
-                  m.e023i, c_e3i, m.e01, c_e013i, m.e0i, c_e023i, m.e012i, c_e123i, m.e02),
+              dot(-c_e012i, m.e023i, c_e013i, m.e0i, c_e023i, m.e012i, c_e0123, m.e2i, c_e123i,
+                  m.e02, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, c_e0i, m.e031i, -c_e01, m.e3i,
+                  -c_e02, m.e123i, c_e03, m.e1i, -c_e1i, m.e03, -c_e2i, m.e0123, c_e3i, m.e01),
               b.e31),
           .e12 = mul_add(
               S(2),
-              dot(c_e01, m.e2i, -c_e02, m.e1i, c_e12, m.s, -c_e03, m.e123i, c_e13, m.e23, c_e23,
-                  m.e31, c_e0123, m.e3i, c_e0i, m.e012i, c_e1i, m.e02, -c_e2i, m.e01, -c_e012i,
-                  m.e0i, -c_e3i, m.e0123, -c_e013i, m.e023i, -c_e023i, m.e031i, c_e123i, m.e03),
+              dot(-c_e012i, m.e0i, -c_e013i, m.e023i, -c_e023i, m.e031i, c_e0123, m.e3i, c_e123i,
+                  m.e03, c_e12, m.s, c_e13, m.e23, c_e23, m.e31, c_e0i, m.e012i, c_e01, m.e2i,
+                  -c_e02, m.e1i, -c_e03, m.e123i, c_e1i, m.e02, -c_e2i, m.e01, -c_e3i, m.e0123),
               b.e12),
           .e1i = mul_add(
               S(2),
-              dot(-c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, -c_e0i, m.e1i, c_e1i, m.s, c_e1i,
-                  m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e012i, m.e2i, -c_e3i, m.e31, -c_e3i,
-                  m.e031i, -c_e013i, m.e3i, -c_e023i, m.e123i, c_e123i, m.e23, c_e123i, m.e023i),
+              dot(c_e123i, m.e23, c_e123i, m.e023i, -c_e012i, m.e2i, -c_e013i, m.e3i, -c_e023i,
+                  m.e123i, c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e3i, m.e31,
+                  -c_e3i, m.e031i, -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, -c_e0i, m.e1i),
               b.e1i),
           .e2i = mul_add(
               S(2),
-              dot(c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e0i, m.e2i, -c_e1i, m.e12, -c_e1i,
-                  m.e012i, c_e2i, m.s, c_e2i, m.e0i, c_e012i, m.e1i, c_e3i, m.e23, c_e3i, m.e023i,
-                  c_e013i, m.e123i, -c_e023i, m.e3i, c_e123i, m.e31, c_e123i, m.e031i),
+              dot(c_e123i, m.e31, c_e123i, m.e031i, c_e012i, m.e1i, c_e013i, m.e123i, -c_e023i,
+                  m.e3i, -c_e1i, m.e12, -c_e1i, m.e012i, c_e2i, m.s, c_e2i, m.e0i, c_e3i, m.e23,
+                  c_e3i, m.e023i, c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e0i, m.e2i),
               b.e2i),
           .e3i = mul_add(
               S(2),
-              dot(-c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, -c_e0i, m.e3i, c_e1i, m.e31, c_e1i,
-                  m.e031i, -c_e2i, m.e23, -c_e2i, m.e023i, -c_e012i, m.e123i, c_e3i, m.s, c_e3i,
-                  m.e0i, c_e013i, m.e1i, c_e023i, m.e2i, c_e123i, m.e12, c_e123i, m.e012i),
+              dot(c_e123i, m.e12, c_e123i, m.e012i, -c_e012i, m.e123i, c_e013i, m.e1i, c_e023i,
+                  m.e2i, c_e1i, m.e31, c_e1i, m.e031i, -c_e2i, m.e23, -c_e2i, m.e023i, c_e3i, m.s,
+                  c_e3i, m.e0i, -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, -c_e0i, m.e3i),
               b.e3i),
           .e0i = mul_add(
               S(2),
-              dot(-c_e01, m.e1i, -c_e02, m.e2i, -c_e12, m.e012i, -c_e03, m.e3i, c_e13, m.e031i,
-                  -c_e23, m.e023i, -c_e0123, m.e123i, c_e0i, m.s, c_e1i, m.e01, c_e2i, m.e02,
-                  c_e012i, m.e12, c_e3i, m.e03, -c_e013i, m.e31, c_e023i, m.e23, c_e123i, m.e0123),
+              dot(c_e012i, m.e12, -c_e013i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i, c_e123i,
+                  m.e0123, -c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e0i, m.s, -c_e01,
+                  m.e1i, -c_e02, m.e2i, -c_e03, m.e3i, c_e1i, m.e01, c_e2i, m.e02, c_e3i, m.e03),
               b.e0i),
           .e01 = mul_add(
               S(2),
-              dot(c_e01, m.s, -c_e01, m.e0i, c_e02, m.e12, -c_e02, m.e012i, -c_e12, m.e02, -c_e03,
-                  m.e31, c_e03, m.e031i, -c_e13, m.e03, -c_e23, m.e0123, c_e0123, m.e23, -c_e0123,
-                  m.e023i, c_e0i, m.e01, c_e012i, m.e02, c_e013i, m.e03, c_e023i, m.e0123),
+              dot(c_e0123, m.e23, -c_e0123, m.e023i, c_e012i, m.e02, c_e013i, m.e03, c_e023i,
+                  m.e0123, c_e01, m.s, -c_e01, m.e0i, c_e02, m.e12, -c_e02, m.e012i, -c_e03, m.e31,
+                  c_e03, m.e031i, -c_e12, m.e02, -c_e13, m.e03, -c_e23, m.e0123, c_e0i, m.e01),
               b.e01),
           .e02 = mul_add(
               S(2),
-              dot(-c_e01, m.e12, c_e01, m.e012i, c_e02, m.s, -c_e02, m.e0i, c_e12, m.e01, c_e03,
-                  m.e23, -c_e03, m.e023i, c_e13, m.e0123, -c_e23, m.e03, c_e0123, m.e31, -c_e0123,
-                  m.e031i, c_e0i, m.e02, -c_e012i, m.e01, -c_e013i, m.e0123, c_e023i, m.e03),
+              dot(c_e0123, m.e31, -c_e0123, m.e031i, -c_e012i, m.e01, -c_e013i, m.e0123, c_e023i,
+                  m.e03, -c_e01, m.e12, c_e01, m.e012i, c_e02, m.s, -c_e02, m.e0i, c_e03, m.e23,
+                  -c_e03, m.e023i, c_e12, m.e01, c_e13, m.e0123, -c_e23, m.e03, c_e0i, m.e02),
               b.e02),
           .e03 = mul_add(
               S(2),
-              dot(c_e01, m.e31, -c_e01, m.e031i, -c_e02, m.e23, c_e02, m.e023i, -c_e12, m.e0123,
-                  c_e03, m.s, -c_e03, m.e0i, c_e13, m.e01, c_e23, m.e02, c_e0123, m.e12, -c_e0123,
-                  m.e012i, c_e0i, m.e03, c_e012i, m.e0123, -c_e013i, m.e01, -c_e023i, m.e02),
+              dot(c_e0123, m.e12, -c_e0123, m.e012i, c_e012i, m.e0123, -c_e013i, m.e01, -c_e023i,
+                  m.e02, c_e01, m.e31, -c_e01, m.e031i, -c_e02, m.e23, c_e02, m.e023i, c_e03, m.s,
+                  -c_e03, m.e0i, -c_e12, m.e0123, c_e13, m.e01, c_e23, m.e02, c_e0i, m.e03),
               b.e03)};
 }
 
 /// sandwich: Versor Trivector -> Trivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 240 mul, 215 add (190 fused).
+/// Cost: 240 mul, 215 add (170 fused).
 template <class S>
 [[nodiscard]] constexpr Trivector<S> sandwich(const Versor<S>& m, const Trivector<S>& t) noexcept {
   const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
-  const S c_e1 = dot(m.e123i, t.e023, m.e031i, t.e03i, -m.e012i, t.e02i, -m.e0123, t.e23i);
-  const S c_e2 = dot(m.e123i, t.e031, -m.e023i, t.e03i, m.e012i, t.e01i, -m.e0123, t.e31i);
+  const S c_e1 = dot(m.e031i, t.e03i, -m.e012i, t.e02i, m.e123i, t.e023, -m.e0123, t.e23i);
+  const S c_e2 = dot(-m.e023i, t.e03i, m.e012i, t.e01i, m.e123i, t.e031, -m.e0123, t.e31i);
   const S c_e012 = dot(-m.e23, t.e031, m.e31, t.e023, -m.e0i, t.e012, -m.e01, t.e02i, m.e02, t.e01i,
                        m.e03, t.e123);
-  const S c_e3 = dot(m.e123i, t.e012, m.e023i, t.e02i, -m.e031i, t.e01i, -m.e0123, t.e12i);
+  const S c_e3 = dot(m.e023i, t.e02i, -m.e031i, t.e01i, m.e123i, t.e012, -m.e0123, t.e12i);
   const S c_e013 = dot(-m.e23, t.e012, m.e12, t.e023, m.e0i, t.e031, -m.e01, t.e03i, -m.e02, t.e123,
                        m.e03, t.e01i);
   const S c_e023 = dot(-m.e31, t.e012, m.e12, t.e031, -m.e0i, t.e023, m.e01, t.e123, -m.e02, t.e03i,
                        m.e03, t.e02i);
   const S c_e123 = dot(-m.e1i, t.e023, -m.e2i, t.e031, -m.e3i, t.e012, m.e01, t.e23i, m.e02, t.e31i,
                        m.e03, t.e12i);
-  const S c_ei = dot(m.e123i, t.e123, -m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i);
+  const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
   const S c_e01i = dot(-m.e31, t.e03i, m.e12, t.e02i, -m.e2i, t.e012, m.e3i, t.e031, -m.e02, t.e12i,
                        m.e03, t.e31i);
   const S c_e02i = dot(m.e23, t.e03i, -m.e12, t.e01i, m.e1i, t.e012, -m.e3i, t.e023, m.e01, t.e12i,
                        -m.e03, t.e23i);
-  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, -m.e1i, t.e02i, m.e2i, t.e01i, -m.e3i, t.e123,
-                       m.e0i, t.e12i);
+  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, m.e0i, t.e12i, -m.e1i, t.e02i, m.e2i, t.e01i,
+                       -m.e3i, t.e123);
   const S c_e03i = dot(-m.e23, t.e02i, m.e31, t.e01i, -m.e1i, t.e031, m.e2i, t.e023, -m.e01, t.e31i,
                        m.e02, t.e23i);
-  const S c_e13i = dot(-m.e23, t.e12i, m.e12, t.e23i, -m.e1i, t.e03i, m.e2i, t.e123, m.e3i, t.e01i,
-                       -m.e0i, t.e31i);
-  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, -m.e1i, t.e123, -m.e2i, t.e03i, m.e3i, t.e02i,
-                       m.e0i, t.e23i);
+  const S c_e13i = dot(-m.e23, t.e12i, m.e12, t.e23i, -m.e0i, t.e31i, -m.e1i, t.e03i, m.e2i, t.e123,
+                       m.e3i, t.e01i);
+  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, m.e0i, t.e23i, -m.e1i, t.e123, -m.e2i, t.e03i,
+                       m.e3i, t.e02i);
   return {.e023 = mul_add(
               S(2),
-              dot(-c_e0, m.e23, c_e0, m.e023i, -c_e1, m.e0123, c_e2, m.e03, -c_e012, m.e31, c_e012,
-                  m.e031i, -c_e3, m.e02, -c_e013, m.e12, c_e013, m.e012i, c_e023, m.s, -c_e023,
-                  m.e0i, c_e123, m.e01, -c_e01i, m.e0123, c_e02i, m.e03, -c_e03i, m.e02),
+              dot(-c_e0, m.e23, c_e0, m.e023i, -c_e1, m.e0123, c_e2, m.e03, -c_e3, m.e02, -c_e012,
+                  m.e31, c_e012, m.e031i, -c_e013, m.e12, c_e013, m.e012i, c_e023, m.s, -c_e023,
+                  m.e0i, -c_e01i, m.e0123, c_e02i, m.e03, -c_e03i, m.e02, c_e123, m.e01),
               t.e023),
           .e031 = mul_add(
               S(2),
-              dot(-c_e0, m.e31, c_e0, m.e031i, -c_e1, m.e03, -c_e2, m.e0123, c_e012, m.e23, -c_e012,
-                  m.e023i, c_e3, m.e01, -c_e013, m.s, c_e013, m.e0i, -c_e023, m.e12, c_e023,
-                  m.e012i, c_e123, m.e02, -c_e01i, m.e03, -c_e02i, m.e0123, c_e03i, m.e01),
+              dot(-c_e0, m.e31, c_e0, m.e031i, -c_e1, m.e03, -c_e2, m.e0123, c_e3, m.e01, c_e012,
+                  m.e23, -c_e012, m.e023i, -c_e013, m.s, c_e013, m.e0i, -c_e023, m.e12, c_e023,
+                  m.e012i, -c_e01i, m.e03, -c_e02i, m.e0123, c_e03i, m.e01, c_e123, m.e02),
               t.e031),
           .e012 = mul_add(
               S(2),
-              dot(-c_e0, m.e12, c_e0, m.e012i, c_e1, m.e02, -c_e2, m.e01, c_e012, m.s, -c_e012,
-                  m.e0i, -c_e3, m.e0123, c_e013, m.e23, -c_e013, m.e023i, c_e023, m.e31, -c_e023,
-                  m.e031i, c_e123, m.e03, c_e01i, m.e02, -c_e02i, m.e01, -c_e03i, m.e0123),
+              dot(-c_e0, m.e12, c_e0, m.e012i, c_e1, m.e02, -c_e2, m.e01, -c_e3, m.e0123, c_e012,
+                  m.s, -c_e012, m.e0i, c_e013, m.e23, -c_e013, m.e023i, c_e023, m.e31, -c_e023,
+                  m.e031i, c_e01i, m.e02, -c_e02i, m.e01, -c_e03i, m.e0123, c_e123, m.e03),
               t.e012),
           .e123 = mul_add(
               S(2),
-              dot(c_e0, m.e123i, -c_e1, m.e23, -c_e2, m.e31, -c_e012, m.e3i, -c_e3, m.e12, c_e013,
-                  m.e2i, -c_e023, m.e1i, c_e123, m.s, -c_ei, m.e0123, -c_e01i, m.e023i, -c_e02i,
-                  m.e031i, c_e12i, m.e03, -c_e03i, m.e012i, -c_e13i, m.e02, c_e23i, m.e01),
+              dot(-c_e1, m.e23, -c_e2, m.e31, -c_e3, m.e12, c_e0, m.e123i, -c_ei, m.e0123, -c_e01i,
+                  m.e023i, -c_e02i, m.e031i, -c_e03i, m.e012i, c_e123, m.s, -c_e012, m.e3i, c_e013,
+                  m.e2i, -c_e023, m.e1i, c_e12i, m.e03, -c_e13i, m.e02, c_e23i, m.e01),
               t.e123),
           .e01i = mul_add(
               S(2),
-              dot(-c_e0, m.e1i, c_e1, m.e0i, c_e2, m.e012i, -c_e012, m.e2i, -c_e3, m.e031i, -c_e013,
-                  m.e3i, -c_e023, m.e123i, c_e123, m.e023i, -c_ei, m.e01, c_e01i, m.s, c_e02i,
-                  m.e12, -c_e12i, m.e02, -c_e03i, m.e31, -c_e13i, m.e03, -c_e23i, m.e0123),
+              dot(c_e1, m.e0i, c_e2, m.e012i, -c_e3, m.e031i, -c_e0, m.e1i, -c_ei, m.e01, c_e01i,
+                  m.s, c_e02i, m.e12, -c_e03i, m.e31, c_e123, m.e023i, -c_e012, m.e2i, -c_e013,
+                  m.e3i, -c_e023, m.e123i, -c_e12i, m.e02, -c_e13i, m.e03, -c_e23i, m.e0123),
               t.e01i),
           .e02i = mul_add(
               S(2),
-              dot(-c_e0, m.e2i, -c_e1, m.e012i, c_e2, m.e0i, c_e012, m.e1i, c_e3, m.e023i, c_e013,
-                  m.e123i, -c_e023, m.e3i, c_e123, m.e031i, -c_ei, m.e02, -c_e01i, m.e12, c_e02i,
-                  m.s, c_e12i, m.e01, c_e03i, m.e23, c_e13i, m.e0123, -c_e23i, m.e03),
+              dot(-c_e1, m.e012i, c_e2, m.e0i, c_e3, m.e023i, -c_e0, m.e2i, -c_ei, m.e02, -c_e01i,
+                  m.e12, c_e02i, m.s, c_e03i, m.e23, c_e123, m.e031i, c_e012, m.e1i, c_e013,
+                  m.e123i, -c_e023, m.e3i, c_e12i, m.e01, c_e13i, m.e0123, -c_e23i, m.e03),
               t.e02i),
           .e03i = mul_add(
               S(2),
-              dot(-c_e0, m.e3i, c_e1, m.e031i, -c_e2, m.e023i, -c_e012, m.e123i, c_e3, m.e0i,
-                  c_e013, m.e1i, c_e023, m.e2i, c_e123, m.e012i, -c_ei, m.e03, c_e01i, m.e31,
-                  -c_e02i, m.e23, -c_e12i, m.e0123, c_e03i, m.s, c_e13i, m.e01, c_e23i, m.e02),
+              dot(c_e1, m.e031i, -c_e2, m.e023i, c_e3, m.e0i, -c_e0, m.e3i, -c_ei, m.e03, c_e01i,
+                  m.e31, -c_e02i, m.e23, c_e03i, m.s, c_e123, m.e012i, -c_e012, m.e123i, c_e013,
+                  m.e1i, c_e023, m.e2i, -c_e12i, m.e0123, c_e13i, m.e01, c_e23i, m.e02),
               t.e03i),
           .e23i = mul_add(
               S(2),
-              dot(c_e1, m.e123i, -c_e2, m.e3i, c_e3, m.e2i, -c_e123, m.e1i, -c_ei, m.e23, -c_ei,
-                  m.e023i, -c_e01i, m.e123i, c_e02i, m.e3i, -c_e12i, m.e31, -c_e12i, m.e031i,
-                  -c_e03i, m.e2i, -c_e13i, m.e12, -c_e13i, m.e012i, c_e23i, m.s, c_e23i, m.e0i),
+              dot(-c_ei, m.e23, -c_ei, m.e023i, c_e1, m.e123i, -c_e2, m.e3i, c_e3, m.e2i, -c_e12i,
+                  m.e31, -c_e12i, m.e031i, -c_e13i, m.e12, -c_e13i, m.e012i, c_e23i, m.s, c_e23i,
+                  m.e0i, -c_e01i, m.e123i, c_e02i, m.e3i, -c_e03i, m.e2i, -c_e123, m.e1i),
               t.e23i),
           .e31i = mul_add(
               S(2),
-              dot(c_e1, m.e3i, c_e2, m.e123i, -c_e3, m.e1i, -c_e123, m.e2i, -c_ei, m.e31, -c_ei,
-                  m.e031i, -c_e01i, m.e3i, -c_e02i, m.e123i, c_e12i, m.e23, c_e12i, m.e023i, c_e03i,
-                  m.e1i, -c_e13i, m.s, -c_e13i, m.e0i, -c_e23i, m.e12, -c_e23i, m.e012i),
+              dot(-c_ei, m.e31, -c_ei, m.e031i, c_e1, m.e3i, c_e2, m.e123i, -c_e3, m.e1i, c_e12i,
+                  m.e23, c_e12i, m.e023i, -c_e13i, m.s, -c_e13i, m.e0i, -c_e23i, m.e12, -c_e23i,
+                  m.e012i, -c_e01i, m.e3i, -c_e02i, m.e123i, c_e03i, m.e1i, -c_e123, m.e2i),
               t.e31i),
           .e12i = mul_add(
               S(2),
-              dot(-c_e1, m.e2i, c_e2, m.e1i, c_e3, m.e123i, -c_e123, m.e3i, -c_ei, m.e12, -c_ei,
-                  m.e012i, c_e01i, m.e2i, -c_e02i, m.e1i, c_e12i, m.s, c_e12i, m.e0i, -c_e03i,
-                  m.e123i, c_e13i, m.e23, c_e13i, m.e023i, c_e23i, m.e31, c_e23i, m.e031i),
+              dot(-c_ei, m.e12, -c_ei, m.e012i, -c_e1, m.e2i, c_e2, m.e1i, c_e3, m.e123i, c_e12i,
+                  m.s, c_e12i, m.e0i, c_e13i, m.e23, c_e13i, m.e023i, c_e23i, m.e31, c_e23i,
+                  m.e031i, c_e01i, m.e2i, -c_e02i, m.e1i, -c_e03i, m.e123i, -c_e123, m.e3i),
               t.e12i)};
 }
 
 /// sandwich: Versor Quadvector -> Quadvector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 120 mul, 100 add (90 fused).
+/// Cost: 120 mul, 100 add (80 fused).
 template <class S>
 [[nodiscard]] constexpr Quadvector<S> sandwich(const Versor<S>& m,
                                                const Quadvector<S>& q) noexcept {
@@ -1132,49 +1134,49 @@ template <class S>
   const S c_e23 = dot(-m.e031i, q.e012i, m.e012i, q.e031i);
   const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
   const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
-  const S c_e1i = dot(m.e123i, q.e023i, -m.e023i, q.e123i);
-  const S c_e2i = dot(m.e123i, q.e031i, -m.e031i, q.e123i);
+  const S c_e1i = dot(-m.e023i, q.e123i, m.e123i, q.e023i);
+  const S c_e2i = dot(-m.e031i, q.e123i, m.e123i, q.e031i);
   const S c_e012i = dot(-m.e23, q.e031i, m.e31, q.e023i, -m.e3i, q.e0123, m.e03, q.e123i);
-  const S c_e3i = dot(m.e123i, q.e012i, -m.e012i, q.e123i);
+  const S c_e3i = dot(-m.e012i, q.e123i, m.e123i, q.e012i);
   const S c_e013i = dot(-m.e23, q.e012i, m.e12, q.e023i, m.e2i, q.e0123, -m.e02, q.e123i);
   const S c_e023i = dot(-m.e31, q.e012i, m.e12, q.e031i, -m.e1i, q.e0123, m.e01, q.e123i);
-  const S c_e123i = dot(-m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i, m.e0i, q.e123i);
-  return {.e0123 = mul_add(S(2),
-                           dot(-c_e01, m.e23, c_e01, m.e023i, -c_e02, m.e31, c_e02, m.e031i, -c_e12,
-                               m.e03, -c_e03, m.e12, c_e03, m.e012i, c_e13, m.e02, -c_e23, m.e01,
-                               c_e0123, m.s, -c_e0123, m.e0i, -c_e0i, m.e0123, c_e012i, m.e03,
-                               -c_e013i, m.e02, c_e023i, m.e01),
-                           q.e0123),
+  const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
+  return {.e0123 = mul_add(
+              S(2),
+              dot(-c_e01, m.e23, c_e01, m.e023i, -c_e02, m.e31, c_e02, m.e031i, -c_e03, m.e12,
+                  c_e03, m.e012i, -c_e12, m.e03, c_e13, m.e02, -c_e23, m.e01, -c_e0i, m.e0123,
+                  c_e0123, m.s, -c_e0123, m.e0i, c_e012i, m.e03, -c_e013i, m.e02, c_e023i, m.e01),
+              q.e0123),
           .e023i = mul_add(
               S(2),
-              dot(c_e01, m.e123i, -c_e02, m.e3i, c_e12, m.e031i, c_e03, m.e2i, c_e13, m.e012i,
-                  -c_e23, m.e0i, -c_e0123, m.e1i, -c_e0i, m.e23, -c_e1i, m.e0123, c_e2i, m.e03,
-                  -c_e012i, m.e31, -c_e3i, m.e02, -c_e013i, m.e12, c_e023i, m.s, c_e123i, m.e01),
+              dot(c_e12, m.e031i, c_e13, m.e012i, -c_e23, m.e0i, -c_e0i, m.e23, c_e01, m.e123i,
+                  -c_e02, m.e3i, c_e03, m.e2i, -c_e1i, m.e0123, c_e2i, m.e03, -c_e3i, m.e02,
+                  -c_e012i, m.e31, -c_e013i, m.e12, c_e023i, m.s, -c_e0123, m.e1i, c_e123i, m.e01),
               q.e023i),
           .e031i = mul_add(
               S(2),
-              dot(c_e01, m.e3i, c_e02, m.e123i, -c_e12, m.e023i, -c_e03, m.e1i, c_e13, m.e0i, c_e23,
-                  m.e012i, -c_e0123, m.e2i, -c_e0i, m.e31, -c_e1i, m.e03, -c_e2i, m.e0123, c_e012i,
-                  m.e23, c_e3i, m.e01, -c_e013i, m.s, -c_e023i, m.e12, c_e123i, m.e02),
+              dot(-c_e12, m.e023i, c_e13, m.e0i, c_e23, m.e012i, -c_e0i, m.e31, c_e01, m.e3i, c_e02,
+                  m.e123i, -c_e03, m.e1i, -c_e1i, m.e03, -c_e2i, m.e0123, c_e3i, m.e01, c_e012i,
+                  m.e23, -c_e013i, m.s, -c_e023i, m.e12, -c_e0123, m.e2i, c_e123i, m.e02),
               q.e031i),
           .e012i = mul_add(
               S(2),
-              dot(-c_e01, m.e2i, c_e02, m.e1i, -c_e12, m.e0i, c_e03, m.e123i, -c_e13, m.e023i,
-                  -c_e23, m.e031i, -c_e0123, m.e3i, -c_e0i, m.e12, c_e1i, m.e02, -c_e2i, m.e01,
-                  c_e012i, m.s, -c_e3i, m.e0123, c_e013i, m.e23, c_e023i, m.e31, c_e123i, m.e03),
+              dot(-c_e12, m.e0i, -c_e13, m.e023i, -c_e23, m.e031i, -c_e0i, m.e12, -c_e01, m.e2i,
+                  c_e02, m.e1i, c_e03, m.e123i, c_e1i, m.e02, -c_e2i, m.e01, -c_e3i, m.e0123,
+                  c_e012i, m.s, c_e013i, m.e23, c_e023i, m.e31, -c_e0123, m.e3i, c_e123i, m.e03),
               q.e012i),
           .e123i = mul_add(
               S(2),
-              dot(-c_e12, m.e3i, c_e13, m.e2i, -c_e23, m.e1i, c_e0i, m.e123i, -c_e1i, m.e23, -c_e1i,
-                  m.e023i, -c_e2i, m.e31, -c_e2i, m.e031i, -c_e012i, m.e3i, -c_e3i, m.e12, -c_e3i,
-                  m.e012i, c_e013i, m.e2i, -c_e023i, m.e1i, c_e123i, m.s, c_e123i, m.e0i),
+              dot(-c_e1i, m.e23, -c_e1i, m.e023i, -c_e2i, m.e31, -c_e2i, m.e031i, -c_e3i, m.e12,
+                  -c_e3i, m.e012i, -c_e12, m.e3i, c_e13, m.e2i, -c_e23, m.e1i, c_e0i, m.e123i,
+                  c_e123i, m.s, c_e123i, m.e0i, -c_e012i, m.e3i, c_e013i, m.e2i, -c_e023i, m.e1i),
               q.e123i)};
 }
 
 /// sandwich: Similarity Vector -> Vector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 91 mul, 71 add (65 fused).
+/// Cost: 91 mul, 71 add (57 fused).
 template <class S>
 [[nodiscard]] constexpr Vector<S> sandwich(const Similarity<S>& m, const Vector<S>& v) noexcept {
   const S c_e0 = m.e0i * v.e0;
@@ -1185,44 +1187,44 @@ template <class S>
   const S c_e013 = m.e031i * v.e0;
   const S c_e023 = m.e023i * v.e0;
   const S c_e123 = m.e123i * v.e0;
-  const S c_ei = dot(-m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3, m.e0i, v.ei);
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
   const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
   const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
-  const S c_e12i = dot(-m.e123i, v.e3, m.e012i, v.ei);
+  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
   const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(m.e123i, v.e2, -m.e031i, v.ei);
-  const S c_e23i = dot(-m.e123i, v.e1, m.e023i, v.ei);
-  return {
-      .e0 = mul_add(S(2),
-                    dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i, -c_e013, m.e31,
-                        c_e013, m.e031i, -c_e023, m.e23, c_e023, m.e023i),
-                    v.e0),
-      .e1 = mul_add(
-          S(2),
-          dot(c_e0, m.e1i, c_e1, m.s, c_e2, m.e12, c_e012, m.e2i, -c_e3, m.e31, -c_e013, m.e3i,
-              c_e023, m.e123i, -c_e123, m.e23, c_e01i, m.e0i, c_e02i, m.e012i, -c_e03i, m.e031i),
-          v.e1),
-      .e2 = mul_add(
-          S(2),
-          dot(c_e0, m.e2i, -c_e1, m.e12, c_e2, m.s, -c_e012, m.e1i, c_e3, m.e23, c_e013, m.e123i,
-              c_e023, m.e3i, -c_e123, m.e31, -c_e01i, m.e012i, c_e02i, m.e0i, c_e03i, m.e023i),
-          v.e2),
-      .e3 = mul_add(
-          S(2),
-          dot(c_e0, m.e3i, c_e1, m.e31, -c_e2, m.e23, c_e012, m.e123i, c_e3, m.s, c_e013, m.e1i,
-              -c_e023, m.e2i, -c_e123, m.e12, c_e01i, m.e031i, -c_e02i, m.e023i, c_e03i, m.e0i),
-          v.e3),
-      .ei = mul_add(S(2),
-                    dot(-c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i, c_e123, m.e123i, c_ei, m.s, c_ei,
-                        m.e0i, c_e01i, m.e1i, c_e02i, m.e2i, c_e12i, m.e12, c_e12i, m.e012i, c_e03i,
-                        m.e3i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i, m.e23, c_e23i, m.e023i),
-                    v.ei)};
+  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
+  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  return {.e0 = mul_add(S(2),
+                        dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i, -c_e013,
+                            m.e31, c_e013, m.e031i, -c_e023, m.e23, c_e023, m.e023i),
+                        v.e0),
+          .e1 = mul_add(S(2),
+                        dot(c_e0, m.e1i, c_e012, m.e2i, -c_e013, m.e3i, c_e023, m.e123i, -c_e123,
+                            m.e23, c_e01i, m.e0i, c_e02i, m.e012i, -c_e03i, m.e031i, c_e1, m.s,
+                            c_e2, m.e12, -c_e3, m.e31),
+                        v.e1),
+          .e2 = mul_add(S(2),
+                        dot(c_e0, m.e2i, -c_e012, m.e1i, c_e013, m.e123i, c_e023, m.e3i, -c_e123,
+                            m.e31, -c_e01i, m.e012i, c_e02i, m.e0i, c_e03i, m.e023i, -c_e1, m.e12,
+                            c_e2, m.s, c_e3, m.e23),
+                        v.e2),
+          .e3 = mul_add(S(2),
+                        dot(c_e0, m.e3i, c_e012, m.e123i, c_e013, m.e1i, -c_e023, m.e2i, -c_e123,
+                            m.e12, c_e01i, m.e031i, -c_e02i, m.e023i, c_e03i, m.e0i, c_e1, m.e31,
+                            -c_e2, m.e23, c_e3, m.s),
+                        v.e3),
+          .ei = mul_add(
+              S(2),
+              dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i, m.e23,
+                  c_e23i, m.e023i, c_e123, m.e123i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i,
+                  c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
+              v.ei)};
 }
 
 /// sandwich: Similarity Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 181 mul, 156 add (139 fused).
+/// Cost: 181 mul, 156 add (125 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Similarity<S>& m,
                                              const Bivector<S>& b) noexcept {
@@ -1235,52 +1237,52 @@ template <class S>
   const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
   const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
   const S c_e1i =
-      dot(-b.e3i, m.e31, b.e2i, m.e12, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i, b.e1i, m.e0i);
+      dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e2i, m.e0i);
-  const S c_e012i = dot(-b.e03, m.e123i, -b.e31, m.e023i, b.e23, m.e031i);
+      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i, b.e3i, m.e0i);
-  const S c_e013i = dot(b.e02, m.e123i, -b.e12, m.e023i, b.e23, m.e012i);
-  const S c_e023i = dot(-b.e01, m.e123i, -b.e12, m.e031i, b.e31, m.e012i);
-  const S c_e123i = dot(-b.e0i, m.e123i, b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i);
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
+  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i);
+  const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
   return {.e23 = mul_add(S(2),
-                         dot(-c_e01, m.e123i, c_e02, m.e3i, -c_e12, m.e31, -c_e03, m.e2i, -c_e13,
-                             m.e12, c_e23, m.s, -c_e0123, m.e1i, -c_e0i, m.e023i, c_e012i, m.e031i,
-                             c_e013i, m.e012i, -c_e023i, m.e0i),
+                         dot(-c_e12, m.e31, -c_e13, m.e12, c_e23, m.s, c_e012i, m.e031i, c_e013i,
+                             m.e012i, -c_e023i, m.e0i, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i,
+                             -c_e0123, m.e1i, -c_e0i, m.e023i),
                          b.e23),
           .e31 = mul_add(S(2),
-                         dot(-c_e01, m.e3i, -c_e02, m.e123i, c_e12, m.e23, c_e03, m.e1i, -c_e13,
-                             m.s, -c_e23, m.e12, -c_e0123, m.e2i, -c_e0i, m.e031i, -c_e012i,
-                             m.e023i, c_e013i, m.e0i, c_e023i, m.e012i),
+                         dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, -c_e012i, m.e023i, c_e013i,
+                             m.e0i, c_e023i, m.e012i, -c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i,
+                             -c_e0123, m.e2i, -c_e0i, m.e031i),
                          b.e31),
           .e12 = mul_add(S(2),
-                         dot(c_e01, m.e2i, -c_e02, m.e1i, c_e12, m.s, -c_e03, m.e123i, c_e13, m.e23,
-                             c_e23, m.e31, -c_e0123, m.e3i, -c_e0i, m.e012i, -c_e012i, m.e0i,
-                             -c_e013i, m.e023i, -c_e023i, m.e031i),
+                         dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31, -c_e012i, m.e0i, -c_e013i,
+                             m.e023i, -c_e023i, m.e031i, c_e01, m.e2i, -c_e02, m.e1i, -c_e03,
+                             m.e123i, -c_e0123, m.e3i, -c_e0i, m.e012i),
                          b.e12),
           .e1i = mul_add(
               S(2),
-              dot(-c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e0i, m.e1i, c_e1i, m.s, c_e1i,
-                  m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e012i, m.e2i, -c_e3i, m.e31, -c_e3i,
-                  m.e031i, -c_e013i, m.e3i, -c_e023i, m.e123i, c_e123i, m.e23, c_e123i, m.e023i),
+              dot(c_e123i, m.e23, c_e123i, m.e023i, -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i,
+                  -c_e012i, m.e2i, -c_e013i, m.e3i, -c_e023i, m.e123i, c_e1i, m.s, c_e1i, m.e0i,
+                  c_e2i, m.e12, c_e2i, m.e012i, -c_e3i, m.e31, -c_e3i, m.e031i, c_e0i, m.e1i),
               b.e1i),
           .e2i = mul_add(
               S(2),
-              dot(c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, c_e0i, m.e2i, -c_e1i, m.e12, -c_e1i,
-                  m.e012i, c_e2i, m.s, c_e2i, m.e0i, c_e012i, m.e1i, c_e3i, m.e23, c_e3i, m.e023i,
-                  c_e013i, m.e123i, -c_e023i, m.e3i, c_e123i, m.e31, c_e123i, m.e031i),
+              dot(c_e123i, m.e31, c_e123i, m.e031i, c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i,
+                  c_e012i, m.e1i, c_e013i, m.e123i, -c_e023i, m.e3i, -c_e1i, m.e12, -c_e1i, m.e012i,
+                  c_e2i, m.s, c_e2i, m.e0i, c_e3i, m.e23, c_e3i, m.e023i, c_e0i, m.e2i),
               b.e2i),
           .e3i = mul_add(
               S(2),
-              dot(-c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e0i, m.e3i, c_e1i, m.e31, c_e1i,
-                  m.e031i, -c_e2i, m.e23, -c_e2i, m.e023i, -c_e012i, m.e123i, c_e3i, m.s, c_e3i,
-                  m.e0i, c_e013i, m.e1i, c_e023i, m.e2i, c_e123i, m.e12, c_e123i, m.e012i),
+              dot(c_e123i, m.e12, c_e123i, m.e012i, -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i,
+                  -c_e012i, m.e123i, c_e013i, m.e1i, c_e023i, m.e2i, c_e1i, m.e31, c_e1i, m.e031i,
+                  -c_e2i, m.e23, -c_e2i, m.e023i, c_e3i, m.s, c_e3i, m.e0i, c_e0i, m.e3i),
               b.e3i),
           .e0i = mul_add(S(2),
-                         dot(-c_e01, m.e1i, -c_e02, m.e2i, -c_e12, m.e012i, -c_e03, m.e3i, c_e13,
-                             m.e031i, -c_e23, m.e023i, c_e0123, m.e123i, -c_e0i, m.s, c_e012i,
-                             m.e12, -c_e013i, m.e31, c_e023i, m.e23),
+                         dot(-c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e012i, m.e12,
+                             -c_e013i, m.e31, c_e023i, m.e23, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03,
+                             m.e3i, c_e0123, m.e123i, -c_e0i, m.s),
                          b.e0i),
           .e01 = mul_add(S(2),
                          dot(c_e01, m.s, -c_e01, m.e0i, c_e02, m.e12, -c_e02, m.e012i, -c_e03,
@@ -1312,19 +1314,19 @@ template <class S>
   const S c_e13i = m.e123i * v.e2;
   const S c_e23i = m.e123i * v.e1;
   return {.e0 = v.e0,
-          .e1 = mul_add(S(2), dot(c_e1, m.s, c_e2, m.e12, -c_e3, m.e31, -c_e123, m.e23), v.e1),
-          .e2 = mul_add(S(2), dot(-c_e1, m.e12, c_e2, m.s, c_e3, m.e23, -c_e123, m.e31), v.e2),
-          .e3 = mul_add(S(2), dot(c_e1, m.e31, -c_e2, m.e23, c_e3, m.s, -c_e123, m.e12), v.e3),
+          .e1 = mul_add(S(2), dot(-c_e123, m.e23, c_e1, m.s, c_e2, m.e12, -c_e3, m.e31), v.e1),
+          .e2 = mul_add(S(2), dot(-c_e123, m.e31, -c_e1, m.e12, c_e2, m.s, c_e3, m.e23), v.e2),
+          .e3 = mul_add(S(2), dot(-c_e123, m.e12, c_e1, m.e31, -c_e2, m.e23, c_e3, m.s), v.e3),
           .ei = mul_add(S(2),
-                        dot(-c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i, c_e123, m.e123i, -c_ei, m.s,
-                            -c_e12i, m.e12, -c_e13i, m.e31, -c_e23i, m.e23),
+                        dot(-c_e12i, m.e12, -c_e13i, m.e31, -c_e23i, m.e23, c_e123, m.e123i, -c_ei,
+                            m.s, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
                         v.ei)};
 }
 
 /// sandwich: Motor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 117 mul, 93 add (80 fused).
+/// Cost: 117 mul, 93 add (74 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Motor<S>& m, const Bivector<S>& b) noexcept {
   const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12);
@@ -1342,35 +1344,35 @@ template <class S>
   const S c_e023i = b.e01 * m.e123i;
   const S c_e123i = b.e0i * m.e123i;
   return {.e23 = mul_add(S(2),
-                         dot(-c_e01, m.e123i, c_e02, m.e3i, -c_e12, m.e31, -c_e03, m.e2i, -c_e13,
+                         dot(-c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i, -c_e12, m.e31, -c_e13,
                              m.e12, c_e23, m.s),
                          b.e23),
           .e31 = mul_add(S(2),
-                         dot(-c_e01, m.e3i, -c_e02, m.e123i, c_e12, m.e23, c_e03, m.e1i, -c_e13,
+                         dot(-c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i, c_e12, m.e23, -c_e13,
                              m.s, -c_e23, m.e12),
                          b.e31),
           .e12 = mul_add(S(2),
-                         dot(c_e01, m.e2i, -c_e02, m.e1i, c_e12, m.s, -c_e03, m.e123i, c_e13, m.e23,
+                         dot(c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i, c_e12, m.s, c_e13, m.e23,
                              c_e23, m.e31),
                          b.e12),
           .e1i = mul_add(S(2),
-                         dot(-c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e0i, m.e1i, c_e1i,
-                             m.s, c_e2i, m.e12, c_e012i, m.e2i, -c_e3i, m.e31, -c_e013i, m.e3i,
-                             c_e023i, m.e123i, -c_e123i, m.e23),
+                         dot(-c_e123i, m.e23, c_e012i, m.e2i, -c_e013i, m.e3i, c_e023i, m.e123i,
+                             -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i,
+                             m.e12, -c_e3i, m.e31, c_e0i, m.e1i),
                          b.e1i),
           .e2i = mul_add(S(2),
-                         dot(c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, c_e0i, m.e2i, -c_e1i,
-                             m.e12, c_e2i, m.s, -c_e012i, m.e1i, c_e3i, m.e23, c_e013i, m.e123i,
-                             c_e023i, m.e3i, -c_e123i, m.e31),
+                         dot(-c_e123i, m.e31, -c_e012i, m.e1i, c_e013i, m.e123i, c_e023i, m.e3i,
+                             c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s,
+                             c_e3i, m.e23, c_e0i, m.e2i),
                          b.e2i),
           .e3i = mul_add(S(2),
-                         dot(-c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e0i, m.e3i, c_e1i,
-                             m.e31, -c_e2i, m.e23, c_e012i, m.e123i, c_e3i, m.s, c_e013i, m.e1i,
-                             -c_e023i, m.e2i, -c_e123i, m.e12),
+                         dot(-c_e123i, m.e12, c_e012i, m.e123i, c_e013i, m.e1i, -c_e023i, m.e2i,
+                             -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i,
+                             m.e23, c_e3i, m.s, c_e0i, m.e3i),
                          b.e3i),
           .e0i = mul_add(S(-2),
-                         dot(c_e01, m.e1i, c_e02, m.e2i, c_e03, m.e3i, c_e0i, m.s, c_e012i, m.e12,
-                             c_e013i, m.e31, c_e023i, m.e23),
+                         dot(c_e012i, m.e12, c_e013i, m.e31, c_e023i, m.e23, c_e01, m.e1i, c_e02,
+                             m.e2i, c_e03, m.e3i, c_e0i, m.s),
                          b.e0i),
           .e01 = mul_add(S(2), dot(c_e01, m.s, c_e02, m.e12, -c_e03, m.e31), b.e01),
           .e02 = mul_add(S(2), dot(-c_e01, m.e12, c_e02, m.s, c_e03, m.e23), b.e02),
@@ -1380,18 +1382,18 @@ template <class S>
 /// sandwich: Motor Point -> Point
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 R × (X ~R).
-/// Cost: 32 mul, 28 add (24 fused).
+/// Cost: 32 mul, 28 add (20 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Motor<S>& m,
                                                          const Point<S>& x) noexcept {
-  const S y_e1 = dot(-m.e1i, m.s, x.e1, m.e12, x.e2, -m.e31, x.e3);
-  const S y_e2 = dot(-m.e2i, -m.e12, x.e1, m.s, x.e2, m.e23, x.e3);
-  const S y_e3 = dot(-m.e3i, m.e31, x.e1, -m.e23, x.e2, m.s, x.e3);
-  const S y_e123 = dot(m.e123i, -m.e23, x.e1, -m.e31, x.e2, -m.e12, x.e3);
+  const S y_e1 = dot(m.s, x.e1, m.e12, x.e2, -m.e31, x.e3) - m.e1i;
+  const S y_e2 = dot(-m.e12, x.e1, m.s, x.e2, m.e23, x.e3) - m.e2i;
+  const S y_e3 = dot(m.e31, x.e1, -m.e23, x.e2, m.s, x.e3) - m.e3i;
+  const S y_e123 = dot(-m.e23, x.e1, -m.e31, x.e2, -m.e12, x.e3) + m.e123i;
   return {
-      .e1 = mul_add(S(2), dot(-m.e31, y_e3, m.e12, y_e2, -m.e1i, m.s, -m.e123i, m.e23), x.e1),
-      .e2 = mul_add(S(2), dot(m.e23, y_e3, -m.e12, y_e1, -m.e2i, m.s, -m.e123i, m.e31), x.e2),
-      .e3 = mul_add(S(2), dot(-m.e23, y_e2, m.e31, y_e1, -m.e3i, m.s, -m.e12, m.e123i), x.e3),
+      .e1 = mul_add(S(2), dot(-m.e1i, m.s, -m.e123i, m.e23, -m.e31, y_e3, m.e12, y_e2), x.e1),
+      .e2 = mul_add(S(2), dot(-m.e2i, m.s, -m.e123i, m.e31, m.e23, y_e3, -m.e12, y_e1), x.e2),
+      .e3 = mul_add(S(2), dot(-m.e3i, m.s, -m.e12, m.e123i, -m.e23, y_e2, m.e31, y_e1), x.e3),
       .ei = mul_add(S(2), dot(-m.e1i, y_e1, -m.e2i, y_e2, -m.e3i, y_e3, m.e123i, y_e123), x.ei)};
 }
 
@@ -1732,7 +1734,7 @@ template <class S>
 
 /// norm_squared: Versor -> Scalar
 /// <a ~a>₀.
-/// Cost: 13 mul, 11 add (9 fused).
+/// Cost: 13 mul, 11 add (7 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S norm_squared(const Versor<S>& m) noexcept {
   return dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i, m.e023i,
@@ -1969,76 +1971,119 @@ template <class S>
 /// inverse: Even -> Even
 /// a⁻¹: a a⁻¹ = 1.
 /// Not finite where a has no inverse.
-/// Cost: 174 mul, 130 add (106 fused), 1 div.
+/// Cost: 147 mul, 112 add (75 fused), 2 div, 33 select.
 template <class S>
 [[nodiscard]] constexpr Even<S> inverse(const Even<S>& a) noexcept {
-  const S q_e0123 = dot(a.e0123, a.s, -a.e01, a.e23, -a.e02, a.e31, -a.e03, a.e12, -a.e0123, a.e0i,
-                        a.e01, a.e023i, a.e02, a.e031i, a.e012i, a.e03);
-  const S q_e012i = dot(a.e012i, a.s, -a.e031i, a.e23, a.e023i, a.e31, -a.e0i, a.e12, a.e02, a.e1i,
-                        -a.e01, a.e2i, -a.e0123, a.e3i, a.e03, a.e123i);
-  const S q_e013i = dot(-a.e031i, a.s, -a.e012i, a.e23, a.e0i, a.e31, a.e023i, a.e12, a.e03, a.e1i,
-                        a.e0123, a.e2i, -a.e01, a.e3i, -a.e02, a.e123i);
-  const S q_e023i = dot(a.e023i, a.s, -a.e0i, a.e23, -a.e012i, a.e31, a.e031i, a.e12, -a.e0123,
-                        a.e1i, a.e03, a.e2i, -a.e02, a.e3i, a.e01, a.e123i);
-  const S q_e123i = dot(a.e123i, a.s, -a.e1i, a.e23, -a.e2i, a.e31, -a.e12, a.e3i, -a.e023i, a.e1i,
-                        -a.e031i, a.e2i, -a.e012i, a.e3i, a.e0i, a.e123i);
-  const S square = dot(a.s, a.s, a.e23, a.e23, a.e31, a.e31, a.e12, a.e12, -a.e0i, a.e0i, -a.e023i,
-                       a.e023i, -a.e031i, a.e031i, -a.e012i, a.e012i, S(2),
-                       dot(a.e01, a.e1i, a.e02, a.e2i, a.e03, a.e3i, a.e0123, a.e123i));
-  const S omega =
-      dot(-q_e012i, q_e012i, -q_e013i, q_e013i, -q_e023i, q_e023i, S(2), q_e0123 * q_e123i);
-  const S inverse = S(1) / mul_add(square, square, -(S(4) * omega));
-  const S factor = square * inverse;
-  const S slip = S(-2) * inverse;
-  return {
-      .s = dot(factor, a.s, slip,
-               dot(a.e123i, q_e0123, -a.e023i, q_e023i, a.e031i, q_e013i, -a.e012i, q_e012i,
-                   a.e0123, q_e123i)),
-      .e23 = dot(factor, -a.e23, slip,
-                 dot(a.e1i, q_e0123, -a.e0i, q_e023i, -a.e031i, q_e012i, -a.e012i, q_e013i, a.e01,
-                     q_e123i)),
-      .e31 = -dot(factor, a.e31, slip,
-                  dot(-a.e2i, q_e0123, -a.e0i, q_e013i, -a.e023i, q_e012i, a.e012i, q_e023i, -a.e02,
-                      q_e123i)),
-      .e12 = dot(
-          factor, -a.e12, slip,
-          dot(a.e3i, q_e0123, -a.e0i, q_e012i, a.e023i, q_e013i, a.e031i, q_e023i, a.e03, q_e123i)),
-      .e1i = dot(factor, -a.e1i, slip,
-                 dot(a.e23, q_e123i, -a.e2i, q_e012i, -a.e3i, q_e013i, a.e123i, q_e023i, -a.e023i,
-                     q_e123i)),
-      .e2i = dot(factor, -a.e2i, slip,
-                 dot(a.e31, q_e123i, a.e1i, q_e012i, -a.e3i, q_e023i, -a.e123i, q_e013i, -a.e031i,
-                     q_e123i)),
-      .e3i = dot(
-          factor, -a.e3i, slip,
-          dot(a.e12, q_e123i, a.e1i, q_e013i, a.e2i, q_e023i, a.e123i, q_e012i, -a.e012i, q_e123i)),
-      .e123i =
-          dot(factor, a.e123i, slip,
-              dot(a.s, q_e123i, a.e1i, q_e023i, -a.e2i, q_e013i, a.e3i, q_e012i, -a.e0i, q_e123i)),
-      .e0i = dot(factor, -a.e0i, slip,
-                 dot(a.e23, q_e023i, -a.e31, q_e013i, a.e12, q_e012i, a.e123i, q_e0123, -a.e0123,
-                     q_e123i)),
-      .e023i =
-          dot(factor, a.e023i, slip,
-              dot(a.s, q_e023i, a.e31, q_e012i, a.e12, q_e013i, a.e1i, q_e0123, -a.e01, q_e123i)),
-      .e031i =
-          -dot(factor, -a.e031i, slip,
-               dot(a.s, q_e013i, a.e23, q_e012i, -a.e12, q_e023i, -a.e2i, q_e0123, a.e02, q_e123i)),
-      .e012i =
-          dot(factor, a.e012i, slip,
-              dot(a.s, q_e012i, -a.e23, q_e013i, -a.e31, q_e023i, a.e3i, q_e0123, -a.e03, q_e123i)),
-      .e01 = dot(
-          factor, -a.e01, slip,
-          dot(a.e23, q_e0123, a.e023i, q_e0123, a.e02, q_e012i, a.e03, q_e013i, -a.e0123, q_e023i)),
-      .e02 = dot(
-          factor, -a.e02, slip,
-          dot(a.e31, q_e0123, a.e031i, q_e0123, -a.e01, q_e012i, a.e03, q_e023i, a.e0123, q_e013i)),
-      .e03 = dot(factor, -a.e03, slip,
-                 dot(a.e12, q_e0123, a.e012i, q_e0123, -a.e01, q_e013i, -a.e02, q_e023i, -a.e0123,
-                     q_e012i)),
-      .e0123 =
-          dot(factor, a.e0123, slip,
-              dot(a.s, q_e0123, a.e0i, q_e0123, -a.e01, q_e023i, a.e02, q_e013i, -a.e03, q_e012i))};
+  const S a_s = a.s - a.e0i;
+  const S b_s = a.s + a.e0i;
+  const S a_e12 = a.e12 - a.e012i;
+  const S b_e12 = a.e12 + a.e012i;
+  const S a_e13 = -a.e31 + a.e031i;
+  const S b_e13 = a.e31 + a.e031i;
+  const S a_e23 = a.e23 - a.e023i;
+  const S b_e23 = a.e23 + a.e023i;
+  const S size_a = dot(a_s, a_s, a_e12, a_e12, a_e13, a_e13, a_e23, a_e23);
+  const S size_c = dot(a.e0123, a.e0123, a.e03, a.e03, a.e02, a.e02, a.e01, a.e01);
+  const S size_d = S(4) * dot(a.e123i, a.e123i, a.e3i, a.e3i, a.e2i, a.e2i, a.e1i, a.e1i);
+  const S size_b = dot(b_s, b_s, b_e12, b_e12, b_e13, b_e13, b_e23, b_e23);
+  const S diagonal = mul_add(size_a, size_b, -(size_c * size_d));
+  const S p_s = select(diagonal > S(0), a_s, -a.e0123);
+  const S p_e12 = select(diagonal > S(0), a_e12, a.e03);
+  const S p_e13 = select(diagonal > S(0), a_e13, -a.e02);
+  const S p_e23 = select(diagonal > S(0), a_e23, a.e01);
+  const S q_s = select(diagonal > S(0), -a.e0123, a_s);
+  const S q_e12 = select(diagonal > S(0), a.e03, a_e12);
+  const S q_e13 = select(diagonal > S(0), -a.e02, a_e13);
+  const S q_e23 = select(diagonal > S(0), a.e01, a_e23);
+  const S r_s = select(diagonal > S(0), S(2) * -a.e123i, b_s);
+  const S r_e12 = select(diagonal > S(0), S(2) * a.e3i, b_e12);
+  const S r_e13 = select(diagonal > S(0), S(2) * -a.e2i, -b_e13);
+  const S r_e23 = select(diagonal > S(0), S(2) * a.e1i, b_e23);
+  const S s_s = select(diagonal > S(0), b_s, S(2) * -a.e123i);
+  const S s_e12 = select(diagonal > S(0), b_e12, S(2) * a.e3i);
+  const S s_e13 = select(diagonal > S(0), -b_e13, S(2) * -a.e2i);
+  const S s_e23 = select(diagonal > S(0), b_e23, S(2) * a.e1i);
+  const S size = select(diagonal > S(0), size_a, size_c);
+  const S over_p = S(1) / size;
+  const S inverse_p_s = over_p * p_s;
+  const S inverse_p_e12 = over_p * p_e12;
+  const S inverse_p_e13 = over_p * p_e13;
+  const S inverse_p_e23 = over_p * p_e23;
+  const S u_s =
+      dot(inverse_p_s, r_s, inverse_p_e12, r_e12, inverse_p_e13, r_e13, inverse_p_e23, r_e23);
+  const S u_e12 =
+      dot(-inverse_p_e12, r_s, inverse_p_s, r_e12, inverse_p_e23, r_e13, -inverse_p_e13, r_e23);
+  const S u_e13 =
+      dot(-inverse_p_e13, r_s, -inverse_p_e23, r_e12, inverse_p_s, r_e13, inverse_p_e12, r_e23);
+  const S u_e23 =
+      dot(-inverse_p_e23, r_s, inverse_p_e13, r_e12, -inverse_p_e12, r_e13, inverse_p_s, r_e23);
+  const S v_s =
+      dot(inverse_p_s, q_s, inverse_p_e12, q_e12, inverse_p_e13, q_e13, inverse_p_e23, q_e23);
+  const S v_e12 =
+      dot(inverse_p_s, q_e12, -inverse_p_e12, q_s, inverse_p_e13, q_e23, -inverse_p_e23, q_e13);
+  const S v_e13 =
+      dot(inverse_p_s, q_e13, -inverse_p_e12, q_e23, -inverse_p_e13, q_s, inverse_p_e23, q_e12);
+  const S v_e23 =
+      dot(inverse_p_s, q_e23, inverse_p_e12, q_e13, -inverse_p_e13, q_e12, -inverse_p_e23, q_s);
+  const S rest_s = dot(s_s, -q_s, u_s, q_e12, u_e12, q_e13, u_e13, q_e23, u_e23);
+  const S rest_e12 = dot(s_e12, -q_e12, u_s, -q_s, u_e12, q_e23, u_e13, -q_e13, u_e23);
+  const S rest_e13 = dot(s_e13, -q_e13, u_s, -q_e23, u_e12, -q_s, u_e13, q_e12, u_e23);
+  const S rest_e23 = dot(s_e23, -q_e23, u_s, q_e13, u_e12, -q_e12, u_e13, -q_s, u_e23);
+  const S size_of_rest =
+      dot(rest_s, rest_s, rest_e12, rest_e12, rest_e13, rest_e13, rest_e23, rest_e23);
+  const S over_rest = S(1) / size_of_rest;
+  const S inverse_rest_s = over_rest * rest_s;
+  const S inverse_rest_e12 = over_rest * rest_e12;
+  const S inverse_rest_e13 = over_rest * rest_e13;
+  const S inverse_rest_e23 = over_rest * rest_e23;
+  const S right_s = dot(inverse_rest_s, v_s, inverse_rest_e12, v_e12, inverse_rest_e13, v_e13,
+                        inverse_rest_e23, v_e23);
+  const S right_e12 = dot(-inverse_rest_e12, v_s, inverse_rest_s, v_e12, inverse_rest_e23, v_e13,
+                          -inverse_rest_e13, v_e23);
+  const S right_e13 = dot(-inverse_rest_e13, v_s, -inverse_rest_e23, v_e12, inverse_rest_s, v_e13,
+                          inverse_rest_e12, v_e23);
+  const S right_e23 = dot(-inverse_rest_e23, v_s, inverse_rest_e13, v_e12, -inverse_rest_e12, v_e13,
+                          inverse_rest_s, v_e23);
+  const S lower_s = dot(inverse_rest_s, u_s, inverse_rest_e12, u_e12, inverse_rest_e13, u_e13,
+                        inverse_rest_e23, u_e23);
+  const S lower_e12 = dot(inverse_rest_s, u_e12, -inverse_rest_e12, u_s, inverse_rest_e13, u_e23,
+                          -inverse_rest_e23, u_e13);
+  const S lower_e13 = dot(inverse_rest_s, u_e13, -inverse_rest_e12, u_e23, -inverse_rest_e13, u_s,
+                          inverse_rest_e23, u_e12);
+  const S lower_e23 = dot(inverse_rest_s, u_e23, inverse_rest_e12, u_e13, -inverse_rest_e13, u_e12,
+                          -inverse_rest_e23, u_s);
+  const S first_s =
+      dot(inverse_p_s, right_s, u_s, -right_e12, u_e12, -right_e13, u_e13, -right_e23, u_e23);
+  const S first_e12 =
+      dot(-inverse_p_e12, right_s, u_e12, right_e12, u_s, -right_e13, u_e23, right_e23, u_e13);
+  const S first_e13 =
+      dot(-inverse_p_e13, right_s, u_e13, right_e12, u_e23, right_e13, u_s, -right_e23, u_e12);
+  const S first_e23 =
+      dot(-inverse_p_e23, right_s, u_e23, -right_e12, u_e13, right_e13, u_e12, right_e23, u_s);
+  const S inverse_a_s = select(diagonal > S(0), first_s, -lower_s);
+  const S inverse_b_s = select(diagonal > S(0), inverse_rest_s, -right_s);
+  const S inverse_a_e12 = select(diagonal > S(0), first_e12, -lower_e12);
+  const S inverse_b_e12 = select(diagonal > S(0), -inverse_rest_e12, -right_e12);
+  const S inverse_a_e13 = select(diagonal > S(0), first_e13, -lower_e13);
+  const S inverse_b_e13 = select(diagonal > S(0), -inverse_rest_e13, -right_e13);
+  const S inverse_a_e23 = select(diagonal > S(0), first_e23, -lower_e23);
+  const S inverse_b_e23 = select(diagonal > S(0), -inverse_rest_e23, -right_e23);
+  return {.s = S(0.5) * (inverse_a_s + inverse_b_s),
+          .e23 = S(0.5) * (inverse_a_e23 + inverse_b_e23),
+          .e31 = -(S(0.5) * (inverse_a_e13 + inverse_b_e13)),
+          .e12 = S(0.5) * (inverse_a_e12 + inverse_b_e12),
+          .e1i = S(0.5) * select(diagonal > S(0), -lower_e23, first_e23),
+          .e2i = S(0.5) * select(diagonal > S(0), lower_e13, -first_e13),
+          .e3i = S(0.5) * select(diagonal > S(0), -lower_e12, first_e12),
+          .e123i = S(0.5) * select(diagonal > S(0), lower_s, -first_s),
+          .e0i = S(-0.5) * (inverse_a_s - inverse_b_s),
+          .e023i = S(-0.5) * (inverse_a_e23 - inverse_b_e23),
+          .e031i = -(S(-0.5) * (inverse_a_e13 - inverse_b_e13)),
+          .e012i = S(-0.5) * (inverse_a_e12 - inverse_b_e12),
+          .e01 = select(diagonal > S(0), -right_e23, -inverse_rest_e23),
+          .e02 = select(diagonal > S(0), right_e13, inverse_rest_e13),
+          .e03 = select(diagonal > S(0), -right_e12, -inverse_rest_e12),
+          .e0123 = select(diagonal > S(0), right_s, -inverse_rest_s)};
 }
 
 /// inverse: Vector -> Vector
@@ -2082,7 +2127,7 @@ template <class S>
 /// sqrt: Similarity -> Similarity
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 54 mul, 30 add (25 fused), 4 div, 2 select, 2 sqrt.
+/// Cost: 54 mul, 29 add (25 fused), 4 div, 1 abs, 2 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2091,9 +2136,10 @@ template <class S>
                                (S(1) - m.s));
   const S radius = scalar::sqrt(
       mul_add(shifted, shifted, -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i)));
-  const S root = scalar::sqrt(
-      select(shifted > S(0), shifted + radius,
-             -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) / (radius - shifted)));
+  const S total = scalar::abs(shifted) + radius;
+  const S root =
+      scalar::sqrt(select(shifted > S(0), total,
+                          -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) / total));
   const S per_root = S(0.5) / root;
   const S inverse = S(1) / radius;
   const S factor = S(0.5) * (root * inverse);
@@ -2122,7 +2168,7 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 137 mul, 92 add (78 fused), 6 div, 1 abs, 7 select, 3 sqrt.
+/// Cost: 137 mul, 91 add (78 fused), 6 div, 2 abs, 7 select, 3 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2165,10 +2211,11 @@ template <class S>
                              (S(1) - cosine)) *
                   (shifted - side)),
       mul_add(shifted, shifted, -omega)));
+  const S total = scalar::abs(shifted) + radius;
   const S root = scalar::sqrt(select(
-      shifted > S(0), shifted + radius,
+      shifted > S(0), total,
       -dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i) /
-          (radius - shifted)));
+          total));
   const S per_root = S(0.5) / root;
   const S inverse = S(1) / radius;
   const S factor = S(0.5) * (root * inverse);
@@ -2579,7 +2626,7 @@ template <class S>
 
 /// normalize: Versor -> Versor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 174 mul, 131 add (106 fused), 2 div, 2 sqrt.
+/// Cost: 175 mul, 131 add (104 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> normalize(const Versor<S>& m) noexcept {
   const S q_e0123 = dot(m.e0123, m.s, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12, m.e0123, m.e0i,
@@ -2598,7 +2645,8 @@ template <class S>
   const S omega =
       dot(-q_e012i, q_e012i, -q_e013i, q_e013i, -q_e023i, q_e023i, S(2), q_e0123 * q_e123i);
   const S radius = scalar::sqrt(mul_add(square, square, -(S(4) * omega)));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
+  const S total = scalar::abs(square) + radius;
+  const S root = scalar::sqrt(S(0.5) * select(square > S(0), total, -(S(4) * omega) / total));
   const S factor = root / radius;
   const S slip = S(-1) / (root * radius);
   return {
@@ -2654,7 +2702,7 @@ template <class S>
 
 /// normalize: Similarity -> Similarity
 /// M (~M M)^(−1/2): the unit versor nearest to M.
-/// Cost: 103 mul, 71 add (61 fused), 2 div, 2 sqrt.
+/// Cost: 104 mul, 71 add (61 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> normalize(const Similarity<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, m.e031i, m.e23, -m.e023i, m.e31, -m.e0i, m.e12);
@@ -2666,7 +2714,8 @@ template <class S>
                        m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i);
   const S omega = dot(q_e012i, q_e012i, q_e013i, q_e013i, q_e023i, q_e023i);
   const S radius = scalar::sqrt(dot(S(4), omega, square, square));
-  const S root = scalar::sqrt(S(0.5) * (square + radius));
+  const S total = scalar::abs(square) + radius;
+  const S root = scalar::sqrt(S(0.5) * select(square > S(0), total, S(4) * omega / total));
   const S factor = root / radius;
   const S slip = S(-1) / (root * radius);
   return {
@@ -2804,7 +2853,7 @@ template <class S>
 
 /// unit_defect_change: Similarity Similarity -> SimilarityDefect
 /// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
-/// Cost: 53 mul, 43 add (38 fused).
+/// Cost: 53 mul, 43 add (36 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr SimilarityDefect<S> unit_defect_change(
     const Similarity<S>& m, const Similarity<S>& low) noexcept {
@@ -2881,7 +2930,7 @@ template <class S>
 
 /// unit_defect_change: Versor Versor -> VersorDefect
 /// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
-/// Cost: 102 mul, 90 add (84 fused).
+/// Cost: 102 mul, 90 add (72 fused).
 template <class S>
 [[nodiscard]] constexpr VersorDefect<S> unit_defect_change(const Versor<S>& m,
                                                            const Versor<S>& low) noexcept {

@@ -50,7 +50,7 @@ template <class S>
 
 /// kinematics: Similarity Rate -> Similarity
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 84 mul, 60 add (48 fused).  Sparsity: 72 of 84 pairs of components.
+/// Cost: 84 mul, 60 add (40 fused).  Sparsity: 72 of 84 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> kinematics(const Similarity<S>& m,
                                                  const sim3::Rate<S>& w) noexcept {
@@ -77,22 +77,22 @@ template <class S>
 /// Ad: Similarity Rate -> Rate
 /// m w ~m: a body rate as a spatial rate.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 107 mul, 90 add (79 fused).
+/// Cost: 107 mul, 90 add (73 fused).
 template <class S>
 [[nodiscard]] constexpr sim3::Rate<S> Ad(const Similarity<S>& m, const sim3::Rate<S>& w) noexcept {
   const S c_e12 = dot(m.e23, w.w31, -m.e31, w.w23);
   const S c_e13 = dot(m.e23, w.w12, -m.e12, w.w23);
   const S c_e23 = dot(m.e31, w.w12, -m.e12, w.w31);
   const S c_e1i =
-      dot(m.e31, w.v3, -m.e12, w.v2, -m.e1i, w.d, m.e2i, w.w12, -m.e3i, w.w31, -m.e0i, w.v1);
+      dot(m.e31, w.v3, -m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12, -m.e3i, w.w31);
   const S c_e2i =
-      dot(-m.e23, w.v3, m.e12, w.v1, -m.e1i, w.w12, -m.e2i, w.d, m.e3i, w.w23, -m.e0i, w.v2);
+      dot(-m.e23, w.v3, m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d, m.e3i, w.w23);
   const S c_e012i = dot(m.e023i, w.w31, -m.e031i, w.w23);
   const S c_e3i =
-      dot(m.e23, w.v2, -m.e31, w.v1, m.e1i, w.w31, -m.e2i, w.w23, -m.e3i, w.d, -m.e0i, w.v3);
+      dot(m.e23, w.v2, -m.e31, w.v1, -m.e0i, w.v3, m.e1i, w.w31, -m.e2i, w.w23, -m.e3i, w.d);
   const S c_e013i = dot(m.e023i, w.w12, -m.e012i, w.w23);
   const S c_e023i = dot(m.e031i, w.w12, -m.e012i, w.w31);
-  const S c_e123i = dot(m.e123i, w.d, m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3);
+  const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
   return {
       .w23 = mul_add(S(2),
                      dot(c_e12, m.e31, c_e13, m.e12, -c_e23, m.s, -c_e012i, m.e031i, -c_e013i,
@@ -106,23 +106,21 @@ template <class S>
                      dot(-c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31, c_e012i, m.e0i, c_e013i,
                          m.e023i, c_e023i, m.e031i),
                      w.w12),
-      .v1 =
-          mul_add(S(2),
-                  dot(c_e12, m.e2i, c_e13, m.e3i, c_e23, m.e123i, -c_e1i, m.s, -c_e1i, m.e0i,
-                      -c_e2i, m.e12, -c_e2i, m.e012i, c_e012i, m.e2i, c_e3i, m.e31, c_e3i, m.e031i,
-                      c_e013i, m.e3i, c_e023i, m.e123i, c_e123i, m.e23, c_e123i, m.e023i),
-                  w.v1),
+      .v1 = mul_add(S(2),
+                    dot(c_e12, m.e2i, c_e13, m.e3i, c_e23, m.e123i, c_e012i, m.e2i, c_e013i, m.e3i,
+                        c_e023i, m.e123i, c_e123i, m.e23, c_e123i, m.e023i, -c_e1i, m.s, -c_e1i,
+                        m.e0i, -c_e2i, m.e12, -c_e2i, m.e012i, c_e3i, m.e31, c_e3i, m.e031i),
+                    w.v1),
       .v2 = mul_add(S(2),
-                    dot(-c_e12, m.e1i, -c_e13, m.e123i, c_e23, m.e3i, c_e1i, m.e12, c_e1i, m.e012i,
-                        -c_e2i, m.s, -c_e2i, m.e0i, -c_e012i, m.e1i, -c_e3i, m.e23, -c_e3i, m.e023i,
-                        -c_e013i, m.e123i, c_e023i, m.e3i, c_e123i, m.e31, c_e123i, m.e031i),
+                    dot(-c_e12, m.e1i, -c_e13, m.e123i, c_e23, m.e3i, -c_e012i, m.e1i, -c_e013i,
+                        m.e123i, c_e023i, m.e3i, c_e123i, m.e31, c_e123i, m.e031i, c_e1i, m.e12,
+                        c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e3i, m.e23, -c_e3i, m.e023i),
                     w.v2),
-      .v3 =
-          mul_add(S(2),
-                  dot(c_e12, m.e123i, -c_e13, m.e1i, -c_e23, m.e2i, -c_e1i, m.e31, -c_e1i, m.e031i,
-                      c_e2i, m.e23, c_e2i, m.e023i, c_e012i, m.e123i, -c_e3i, m.s, -c_e3i, m.e0i,
-                      -c_e013i, m.e1i, -c_e023i, m.e2i, c_e123i, m.e12, c_e123i, m.e012i),
-                  w.v3),
+      .v3 = mul_add(S(2),
+                    dot(c_e12, m.e123i, -c_e13, m.e1i, -c_e23, m.e2i, c_e012i, m.e123i, -c_e013i,
+                        m.e1i, -c_e023i, m.e2i, c_e123i, m.e12, c_e123i, m.e012i, -c_e1i, m.e31,
+                        -c_e1i, m.e031i, c_e2i, m.e23, c_e2i, m.e023i, -c_e3i, m.s, -c_e3i, m.e0i),
+                    w.v3),
       .d = mul_add(S(2),
                    dot(-c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e012i, m.e12, -c_e013i,
                        m.e31, c_e023i, m.e23),
@@ -132,15 +130,15 @@ template <class S>
 /// Ad_star_inverse: Similarity Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 111 mul, 93 add (83 fused).
+/// Cost: 111 mul, 93 add (75 fused).
 template <class S>
 [[nodiscard]] constexpr sim3::Momentum<S> Ad_star_inverse(const Similarity<S>& m,
                                                           const sim3::Momentum<S>& mu) noexcept {
   const S c_e0 = dot(m.e023i, mu.p1, m.e031i, mu.p2, m.e012i, mu.p3);
-  const S c_e1 = dot(-m.e123i, mu.p1, -m.e031i, mu.l12, m.e012i, mu.l31);
-  const S c_e2 = dot(-m.e123i, mu.p2, m.e023i, mu.l12, -m.e012i, mu.l23);
+  const S c_e1 = dot(-m.e031i, mu.l12, m.e012i, mu.l31, -m.e123i, mu.p1);
+  const S c_e2 = dot(m.e023i, mu.l12, -m.e012i, mu.l23, -m.e123i, mu.p2);
   const S c_e012 = dot(m.e23, mu.p2, -m.e31, mu.p1, m.e0i, mu.p3);
-  const S c_e3 = dot(-m.e123i, mu.p3, -m.e023i, mu.l31, m.e031i, mu.l23);
+  const S c_e3 = dot(-m.e023i, mu.l31, m.e031i, mu.l23, -m.e123i, mu.p3);
   const S c_e013 = dot(m.e23, mu.p3, -m.e12, mu.p1, -m.e0i, mu.p2);
   const S c_e023 = dot(m.e31, mu.p3, -m.e12, mu.p2, m.e0i, mu.p1);
   const S c_e123 = dot(m.e1i, mu.p1, m.e2i, mu.p2, m.e3i, mu.p3);
@@ -148,19 +146,19 @@ template <class S>
   const S c_e02i = dot(-m.e23, mu.l12, m.e12, mu.l23, -m.e1i, mu.p3, m.e3i, mu.p1);
   const S c_e03i = dot(m.e23, mu.l31, -m.e31, mu.l23, m.e1i, mu.p2, -m.e2i, mu.p1);
   return {.l23 = mul_add(S(2),
-                         dot(-c_e0, m.e1i, -c_e1, m.e0i, -c_e2, m.e012i, c_e012, m.e2i, c_e3,
-                             m.e031i, c_e013, m.e3i, c_e023, m.e123i, -c_e123, m.e023i, -c_e01i,
-                             m.s, -c_e02i, m.e12, c_e03i, m.e31),
+                         dot(-c_e1, m.e0i, -c_e2, m.e012i, c_e3, m.e031i, -c_e01i, m.s, -c_e02i,
+                             m.e12, c_e03i, m.e31, -c_e0, m.e1i, c_e012, m.e2i, c_e013, m.e3i,
+                             c_e023, m.e123i, -c_e123, m.e023i),
                          mu.l23),
           .l31 = mul_add(S(2),
-                         dot(-c_e0, m.e2i, c_e1, m.e012i, -c_e2, m.e0i, -c_e012, m.e1i, -c_e3,
-                             m.e023i, -c_e013, m.e123i, c_e023, m.e3i, -c_e123, m.e031i, c_e01i,
-                             m.e12, -c_e02i, m.s, -c_e03i, m.e23),
+                         dot(c_e1, m.e012i, -c_e2, m.e0i, -c_e3, m.e023i, c_e01i, m.e12, -c_e02i,
+                             m.s, -c_e03i, m.e23, -c_e0, m.e2i, -c_e012, m.e1i, -c_e013, m.e123i,
+                             c_e023, m.e3i, -c_e123, m.e031i),
                          mu.l31),
           .l12 = mul_add(S(2),
-                         dot(-c_e0, m.e3i, -c_e1, m.e031i, c_e2, m.e023i, c_e012, m.e123i, -c_e3,
-                             m.e0i, -c_e013, m.e1i, -c_e023, m.e2i, -c_e123, m.e012i, -c_e01i,
-                             m.e31, c_e02i, m.e23, -c_e03i, m.s),
+                         dot(-c_e1, m.e031i, c_e2, m.e023i, -c_e3, m.e0i, -c_e01i, m.e31, c_e02i,
+                             m.e23, -c_e03i, m.s, -c_e0, m.e3i, c_e012, m.e123i, -c_e013, m.e1i,
+                             -c_e023, m.e2i, -c_e123, m.e012i),
                          mu.l12),
           .p1 = mul_add(S(2),
                         dot(-c_e0, m.e23, c_e0, m.e023i, c_e012, m.e31, -c_e012, m.e031i, c_e013,
@@ -175,9 +173,9 @@ template <class S>
                             m.e23, c_e013, m.e023i, -c_e023, m.e31, c_e023, m.e031i),
                         mu.p3),
           .q = mul_add(S(2),
-                       dot(c_e0, m.e123i, c_e1, m.e23, c_e2, m.e31, c_e012, m.e3i, c_e3, m.e12,
-                           -c_e013, m.e2i, c_e023, m.e1i, -c_e123, m.s, c_e01i, m.e023i, c_e02i,
-                           m.e031i, c_e03i, m.e012i),
+                       dot(c_e1, m.e23, c_e2, m.e31, c_e3, m.e12, c_e01i, m.e023i, c_e02i, m.e031i,
+                           c_e03i, m.e012i, c_e0, m.e123i, c_e012, m.e3i, -c_e013, m.e2i, c_e023,
+                           m.e1i, -c_e123, m.s),
                        mu.q)};
 }
 

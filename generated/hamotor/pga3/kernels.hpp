@@ -605,16 +605,16 @@ template <class S>
           .e31 = mul_add(S(2), dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12), b.e31),
           .e12 = mul_add(S(2), dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31), b.e12),
           .e01 = mul_add(S(2),
-                         dot(c_e01, m.s, c_e02, m.e12, -c_e12, m.e02, -c_e03, m.e31, -c_e13, m.e03,
-                             -c_e23, m.e0123),
+                         dot(-c_e12, m.e02, -c_e13, m.e03, -c_e23, m.e0123, c_e01, m.s, c_e02,
+                             m.e12, -c_e03, m.e31),
                          b.e01),
           .e02 = mul_add(S(2),
-                         dot(-c_e01, m.e12, c_e02, m.s, c_e12, m.e01, c_e03, m.e23, c_e13, m.e0123,
-                             -c_e23, m.e03),
+                         dot(c_e12, m.e01, c_e13, m.e0123, -c_e23, m.e03, -c_e01, m.e12, c_e02, m.s,
+                             c_e03, m.e23),
                          b.e02),
           .e03 = mul_add(S(2),
-                         dot(c_e01, m.e31, -c_e02, m.e23, -c_e12, m.e0123, c_e03, m.s, c_e13, m.e01,
-                             c_e23, m.e02),
+                         dot(-c_e12, m.e0123, c_e13, m.e01, c_e23, m.e02, c_e01, m.e31, -c_e02,
+                             m.e23, c_e03, m.s),
                          b.e03)};
 }
 
@@ -642,7 +642,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> sandwich(const Mirror<S>& p,
                                                              const Trivector<S>& t) noexcept {
-  const S c_e0123 = dot(p.e0, t.e123, p.e1, t.e032, p.e2, t.e013, p.e3, t.e021);
+  const S c_e0123 = dot(p.e1, t.e032, p.e2, t.e013, p.e3, t.e021, p.e0, t.e123);
   return {.e123 = -t.e123,
           .e032 = mul_add(S(2), c_e0123 * p.e1, -t.e032),
           .e013 = mul_add(S(2), c_e0123 * p.e2, -t.e013),
@@ -663,9 +663,9 @@ template <class S>
   return {.e23 = mul_add(S(2), dot(c_e2, p.e3, -c_e3, p.e2), b.e23),
           .e31 = mul_add(S(2), dot(-c_e1, p.e3, c_e3, p.e1), b.e31),
           .e12 = mul_add(S(2), dot(c_e1, p.e2, -c_e2, p.e1), b.e12),
-          .e01 = mul_add(S(-2), dot(c_e0, p.e1, c_e1, p.e0), b.e01),
-          .e02 = mul_add(S(-2), dot(c_e0, p.e2, c_e2, p.e0), b.e02),
-          .e03 = mul_add(S(-2), dot(c_e0, p.e3, c_e3, p.e0), b.e03)};
+          .e01 = mul_add(S(-2), dot(c_e1, p.e0, c_e0, p.e1), b.e01),
+          .e02 = mul_add(S(-2), dot(c_e2, p.e0, c_e0, p.e2), b.e02),
+          .e03 = mul_add(S(-2), dot(c_e3, p.e0, c_e0, p.e3), b.e03)};
 }
 
 /// sandwich: Mirror Plane -> Plane

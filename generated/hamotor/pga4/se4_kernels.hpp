@@ -63,7 +63,7 @@ template <class S>
 
 /// kinematics: Motor Rate -> Motor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 144 mul, 112 add (96 fused).  Sparsity: 128 of 160 pairs of components.
+/// Cost: 144 mul, 112 add (80 fused).  Sparsity: 128 of 160 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Motor<S> kinematics(const Motor<S>& m, const se4::Rate<S>& w) noexcept {
   return {
@@ -108,7 +108,7 @@ template <class S>
 /// Ad: Motor Rate -> Rate
 /// m w ~m: a body rate as a spatial rate.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 166 mul, 142 add (118 fused).
+/// Cost: 166 mul, 142 add (110 fused).
 template <class S>
 [[nodiscard]] constexpr se4::Rate<S> Ad(const Motor<S>& m, const se4::Rate<S>& w) noexcept {
   const S c_e01 =
@@ -129,60 +129,57 @@ template <class S>
   const S c_e34 = dot(m.e13, w.w14, -m.e14, w.w13, m.e23, w.w24, -m.e24, w.w23);
   const S c_e0134 = dot(-m.e1234, w.v2, m.e0123, w.w24, -m.e0124, w.w23, m.e0234, w.w12);
   const S c_e0234 = dot(m.e1234, w.v1, -m.e0123, w.w14, m.e0124, w.w13, -m.e0134, w.w12);
-  return {.w12 = mul_add(S(2),
-                         dot(-c_e12, m.s, -c_e13, m.e23, c_e23, m.e13, -c_e14, m.e24, c_e24, m.e14,
-                             c_e34, m.e1234),
-                         w.w12),
-          .w13 = mul_add(S(2),
-                         dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, -c_e14, m.e34, -c_e24,
-                             m.e1234, c_e34, m.e14),
-                         w.w13),
-          .w14 = mul_add(S(2),
-                         dot(c_e12, m.e24, c_e13, m.e34, c_e23, m.e1234, -c_e14, m.s, -c_e24, m.e12,
-                             -c_e34, m.e13),
-                         w.w14),
-          .w23 = mul_add(S(2),
-                         dot(-c_e12, m.e13, c_e13, m.e12, -c_e23, m.s, c_e14, m.e1234, -c_e24,
-                             m.e34, c_e34, m.e24),
-                         w.w23),
-          .w24 = mul_add(S(2),
-                         dot(-c_e12, m.e14, -c_e13, m.e1234, c_e23, m.e34, c_e14, m.e12, -c_e24,
-                             m.s, -c_e34, m.e23),
-                         w.w24),
-          .w34 = mul_add(S(2),
-                         dot(c_e12, m.e1234, -c_e13, m.e14, -c_e23, m.e24, c_e14, m.e13, c_e24,
-                             m.e23, -c_e34, m.s),
-                         w.w34),
-          .v1 = mul_add(
-              S(2),
-              dot(-c_e01, m.s, -c_e02, m.e12, c_e12, m.e02, -c_e03, m.e13, c_e13, m.e03, c_e23,
-                  m.e0123, -c_e0123, m.e23, -c_e04, m.e14, c_e14, m.e04, c_e24, m.e0124, -c_e0124,
-                  m.e24, c_e34, m.e0134, -c_e0134, m.e34, -c_e0234, m.e1234),
-              w.v1),
-          .v2 =
-              mul_add(S(2),
-                      dot(c_e01, m.e12, -c_e02, m.s, -c_e12, m.e01, -c_e03, m.e23, -c_e13, m.e0123,
-                          c_e23, m.e03, c_e0123, m.e13, -c_e04, m.e24, -c_e14, m.e0124, c_e24,
-                          m.e04, c_e0124, m.e14, c_e34, m.e0234, c_e0134, m.e1234, -c_e0234, m.e34),
-                      w.v2),
-          .v3 =
-              mul_add(S(2),
-                      dot(c_e01, m.e13, c_e02, m.e23, c_e12, m.e0123, -c_e03, m.s, -c_e13, m.e01,
-                          -c_e23, m.e02, -c_e0123, m.e12, -c_e04, m.e34, -c_e14, m.e0134, -c_e24,
-                          m.e0234, -c_e0124, m.e1234, c_e34, m.e04, c_e0134, m.e14, c_e0234, m.e24),
-                      w.v3),
-          .v4 =
-              mul_add(S(2),
-                      dot(c_e01, m.e14, c_e02, m.e24, c_e12, m.e0124, c_e03, m.e34, c_e13, m.e0134,
-                          c_e23, m.e0234, c_e0123, m.e1234, -c_e04, m.s, -c_e14, m.e01, -c_e24,
-                          m.e02, -c_e0124, m.e12, -c_e34, m.e03, -c_e0134, m.e13, -c_e0234, m.e23),
-                      w.v4)};
+  return {
+      .w12 = mul_add(S(2),
+                     dot(-c_e12, m.s, -c_e13, m.e23, c_e23, m.e13, -c_e14, m.e24, c_e24, m.e14,
+                         c_e34, m.e1234),
+                     w.w12),
+      .w13 = mul_add(S(2),
+                     dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, -c_e14, m.e34, -c_e24, m.e1234,
+                         c_e34, m.e14),
+                     w.w13),
+      .w14 = mul_add(S(2),
+                     dot(c_e12, m.e24, c_e13, m.e34, c_e23, m.e1234, -c_e14, m.s, -c_e24, m.e12,
+                         -c_e34, m.e13),
+                     w.w14),
+      .w23 = mul_add(S(2),
+                     dot(-c_e12, m.e13, c_e13, m.e12, -c_e23, m.s, c_e14, m.e1234, -c_e24, m.e34,
+                         c_e34, m.e24),
+                     w.w23),
+      .w24 = mul_add(S(2),
+                     dot(-c_e12, m.e14, -c_e13, m.e1234, c_e23, m.e34, c_e14, m.e12, -c_e24, m.s,
+                         -c_e34, m.e23),
+                     w.w24),
+      .w34 = mul_add(S(2),
+                     dot(c_e12, m.e1234, -c_e13, m.e14, -c_e23, m.e24, c_e14, m.e13, c_e24, m.e23,
+                         -c_e34, m.s),
+                     w.w34),
+      .v1 = mul_add(S(2),
+                    dot(c_e12, m.e02, c_e13, m.e03, c_e23, m.e0123, -c_e0123, m.e23, c_e14, m.e04,
+                        c_e24, m.e0124, -c_e0124, m.e24, c_e34, m.e0134, -c_e0134, m.e34, -c_e0234,
+                        m.e1234, -c_e01, m.s, -c_e02, m.e12, -c_e03, m.e13, -c_e04, m.e14),
+                    w.v1),
+      .v2 = mul_add(S(2),
+                    dot(-c_e12, m.e01, -c_e13, m.e0123, c_e23, m.e03, c_e0123, m.e13, -c_e14,
+                        m.e0124, c_e24, m.e04, c_e0124, m.e14, c_e34, m.e0234, c_e0134, m.e1234,
+                        -c_e0234, m.e34, c_e01, m.e12, -c_e02, m.s, -c_e03, m.e23, -c_e04, m.e24),
+                    w.v2),
+      .v3 = mul_add(S(2),
+                    dot(c_e12, m.e0123, -c_e13, m.e01, -c_e23, m.e02, -c_e0123, m.e12, -c_e14,
+                        m.e0134, -c_e24, m.e0234, -c_e0124, m.e1234, c_e34, m.e04, c_e0134, m.e14,
+                        c_e0234, m.e24, c_e01, m.e13, c_e02, m.e23, -c_e03, m.s, -c_e04, m.e34),
+                    w.v3),
+      .v4 = mul_add(S(2),
+                    dot(c_e12, m.e0124, c_e13, m.e0134, c_e23, m.e0234, c_e0123, m.e1234, -c_e14,
+                        m.e01, -c_e24, m.e02, -c_e0124, m.e12, -c_e34, m.e03, -c_e0134, m.e13,
+                        -c_e0234, m.e23, c_e01, m.e14, c_e02, m.e24, c_e03, m.e34, -c_e04, m.s),
+                    w.v4)};
 }
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 188 mul, 163 add (146 fused).
+/// Cost: 188 mul, 163 add (134 fused).
 template <class S>
 [[nodiscard]] constexpr se4::Momentum<S> Ad_star_inverse(const Motor<S>& m,
                                                          const se4::Momentum<S>& mu) noexcept {
@@ -210,61 +207,61 @@ template <class S>
   return {
       .l12 =
           mul_add(S(2),
-                  dot(c_e0, m.e34, c_e1, m.e0134, c_e2, m.e0234, c_e012, m.e1234, -c_e3, m.e04,
-                      -c_e013, m.e14, -c_e023, m.e24, c_e123, m.e0124, c_e4, m.e03, c_e014, m.e13,
-                      c_e024, m.e23, c_e124, m.e0123, -c_e034, m.s, -c_e134, m.e01, c_e234, m.e02),
+                  dot(c_e1, m.e0134, c_e2, m.e0234, -c_e3, m.e04, c_e4, m.e03, c_e0, m.e34, c_e123,
+                      m.e0124, c_e124, m.e0123, -c_e134, m.e01, c_e234, m.e02, c_e012, m.e1234,
+                      -c_e013, m.e14, -c_e023, m.e24, c_e014, m.e13, c_e024, m.e23, -c_e034, m.s),
                   mu.l12),
-      .l13 = mul_add(
-          S(2),
-          dot(-c_e0, m.e24, -c_e1, m.e0124, c_e2, m.e04, c_e012, m.e14, c_e3, m.e0234, c_e013,
-              m.e1234, -c_e023, m.e34, c_e123, m.e0134, -c_e4, m.e02, -c_e014, m.e12, c_e024, m.s,
-              c_e124, m.e01, c_e034, m.e23, c_e134, m.e0123, c_e234, m.e03),
-          mu.l13),
+      .l13 =
+          mul_add(S(2),
+                  dot(-c_e1, m.e0124, c_e2, m.e04, c_e3, m.e0234, -c_e4, m.e02, -c_e0, m.e24,
+                      c_e123, m.e0134, c_e124, m.e01, c_e134, m.e0123, c_e234, m.e03, c_e012, m.e14,
+                      c_e013, m.e1234, -c_e023, m.e34, -c_e014, m.e12, c_e024, m.s, c_e034, m.e23),
+                  mu.l13),
       .l14 =
           mul_add(S(2),
-                  dot(c_e0, m.e23, c_e1, m.e0123, -c_e2, m.e03, -c_e012, m.e13, c_e3, m.e02, c_e013,
-                      m.e12, -c_e023, m.s, c_e123, m.e01, c_e4, m.e0234, c_e014, m.e1234, -c_e024,
-                      m.e34, -c_e124, m.e0134, c_e034, m.e24, c_e134, m.e0124, c_e234, m.e04),
+                  dot(c_e1, m.e0123, -c_e2, m.e03, c_e3, m.e02, c_e4, m.e0234, c_e0, m.e23, c_e123,
+                      m.e01, -c_e124, m.e0134, c_e134, m.e0124, c_e234, m.e04, -c_e012, m.e13,
+                      c_e013, m.e12, -c_e023, m.s, c_e014, m.e1234, -c_e024, m.e34, c_e034, m.e24),
                   mu.l14),
       .l23 = mul_add(
           S(2),
-          dot(c_e0, m.e14, -c_e1, m.e04, -c_e2, m.e0124, c_e012, m.e24, -c_e3,
-              m.e0134, c_e013, m.e34, c_e023, m.e1234, c_e123, m.e0234, c_e4, m.e01, -c_e014, m.s,
-              -c_e024, m.e12, c_e124, m.e02, -c_e034, m.e13, c_e134, m.e03, -c_e234, m.e0123),
+          dot(-c_e1, m.e04, -c_e2, m.e0124, -c_e3, m.e0134, c_e4, m.e01, c_e0, m.e14, c_e123,
+              m.e0234, c_e124, m.e02, c_e134, m.e03, -c_e234, m.e0123, c_e012, m.e24, c_e013, m.e34,
+              c_e023, m.e1234, -c_e014, m.s, -c_e024, m.e12, -c_e034, m.e13),
           mu.l23),
       .l24 = mul_add(
           S(2),
-          dot(-c_e0, m.e13, c_e1, m.e03, c_e2, m.e0123, -c_e012, m.e23, -c_e3, m.e01, c_e013,
-              m.s, c_e023, m.e12, c_e123, m.e02, -c_e4, m.e0134, c_e014, m.e34, c_e024, m.e1234,
-              -c_e124, m.e0234, -c_e034, m.e14, c_e134, m.e04, -c_e234, m.e0124),
+          dot(c_e1, m.e03, c_e2, m.e0123, -c_e3, m.e01, -c_e4, m.e0134, -c_e0, m.e13, c_e123, m.e02,
+              -c_e124, m.e0234, c_e134, m.e04, -c_e234, m.e0124, -c_e012, m.e23, c_e013, m.s,
+              c_e023, m.e12, c_e014, m.e34, c_e024, m.e1234, -c_e034, m.e14),
           mu.l24),
-      .l34 =
-          mul_add(S(2),
-                  dot(c_e0, m.e12, -c_e1, m.e02, c_e2, m.e01, -c_e012, m.s, c_e3, m.e0123, -c_e013,
-                      m.e23, c_e023, m.e13, c_e123, m.e03, c_e4, m.e0124, -c_e014, m.e24, c_e024,
-                      m.e14, -c_e124, m.e04, c_e034, m.e1234, -c_e134, m.e0234, -c_e234, m.e0134),
-                  mu.l34),
+      .l34 = mul_add(
+          S(2),
+          dot(-c_e1, m.e02, c_e2, m.e01, c_e3, m.e0123, c_e4, m.e0124, c_e0, m.e12, c_e123, m.e03,
+              -c_e124, m.e04, -c_e134, m.e0234, -c_e234, m.e0134, -c_e012, m.s, -c_e013, m.e23,
+              c_e023, m.e13, -c_e014, m.e24, c_e024, m.e14, c_e034, m.e1234),
+          mu.l34),
       .p1 = mul_add(S(2),
-                    dot(-c_e1, m.e1234, c_e2, m.e34, -c_e3, m.e24, -c_e123, m.e14, c_e4, m.e23,
+                    dot(-c_e1, m.e1234, c_e2, m.e34, -c_e3, m.e24, c_e4, m.e23, -c_e123, m.e14,
                         -c_e124, m.e13, c_e134, m.e12, c_e234, m.s),
                     mu.p1),
       .p2 = mul_add(S(2),
-                    dot(-c_e1, m.e34, -c_e2, m.e1234, c_e3, m.e14, -c_e123, m.e24, -c_e4, m.e13,
+                    dot(-c_e1, m.e34, -c_e2, m.e1234, c_e3, m.e14, -c_e4, m.e13, -c_e123, m.e24,
                         -c_e124, m.e23, c_e134, m.s, -c_e234, m.e12),
                     mu.p2),
       .p3 = mul_add(S(2),
-                    dot(c_e1, m.e24, -c_e2, m.e14, -c_e3, m.e1234, -c_e123, m.e34, c_e4, m.e12,
+                    dot(c_e1, m.e24, -c_e2, m.e14, -c_e3, m.e1234, c_e4, m.e12, -c_e123, m.e34,
                         -c_e124, m.s, -c_e134, m.e23, -c_e234, m.e13),
                     mu.p3),
       .p4 = mul_add(S(2),
-                    dot(-c_e1, m.e23, c_e2, m.e13, -c_e3, m.e12, -c_e123, m.s, -c_e4, m.e1234,
+                    dot(-c_e1, m.e23, c_e2, m.e13, -c_e3, m.e12, -c_e4, m.e1234, -c_e123, m.s,
                         c_e124, m.e34, -c_e134, m.e24, -c_e234, m.e14),
                     mu.p4)};
 }
 
 /// pairing: Momentum Rate -> Scalar
 /// μ(w) = (μ ∧ w) / I: twice the kinetic energy if w is the rate of μ.
-/// Cost: 10 mul, 9 add (8 fused).
+/// Cost: 10 mul, 9 add (6 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S pairing(const se4::Momentum<S>& mu,
                                                  const se4::Rate<S>& w) noexcept {

@@ -15,6 +15,7 @@ from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, Rational, grade, magnitude, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel, parameters_for, reversed_value, value_of
+from hamotor.codegen.nullsplit import hyperbolic_pairs
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Call,
@@ -189,6 +190,12 @@ def _may_be_isoclinic(algebra: Algebra, quad: PolynomialMultivector) -> bool:
     """Whether W² can be positive, for W with independent components."""
     omega = poly.apply_bilinear(algebra.geometric, quad, quad).get(0, {})
     return any(x > 0 for x in omega.values())
+
+
+def _may_be_negative(algebra: Algebra, quad: PolynomialMultivector) -> bool:
+    """Whether W² can be negative, for W with independent components."""
+    omega = poly.apply_bilinear(algebra.geometric, quad, quad).get(0, {})
+    return any(x < 0 for x in omega.values())
 
 
 def _isoclinic(
@@ -618,13 +625,21 @@ def cayley_inverse_kernel(
 
 
 def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: str) -> Kernel:
-    """A⁻¹ = ~A (N − Q) / (N² − q) for A even or odd, n ≤ 5: A ~A = N + Q, Q of grade 4, Q² = q."""
+    """A⁻¹ = ~A (N − Q) / (N² − q) for A even or odd, n ≤ 5: A ~A = N + Q, Q of grade 4, Q² = q.
+
+    Even elements that are matrices of quaternions are inverted as such: fewer operations, and for
+    those that hardly have an inverse more digits.
+    """
     (parameter,) = parameters_for(operand)
     writer = Writer()
     value = value_of(parameter)
     if len({g % 2 for g in operand.grades}) != 1:
         return _mixed_inverse_kernel(algebra, parameter, result, where)
     square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
+    matrix = _Matrix.of(algebra)
+    if matrix and 0 in operand.grades and square.keys() - {0}:
+        out = matrix.inverse(writer, value)
+        return _inverse(algebra, parameter, writer, out, result, where)
     parts = square_of(algebra, writer, square, "q", where)
     norm = writer.let("norm2", polynomial_expression(parts.number))
     reversed_ = reversed_value(value)
@@ -649,6 +664,157 @@ def inverse_kernel(algebra: Algebra, operand: Element, result: Element, where: s
             turned = poly.apply_bilinear(algebra.geometric, reversed_, {blade: {(): 1}})
         out = _combination([(factor, reversed_), (slip, turned)], {})
     return _inverse(algebra, parameter, writer, out, result, where)
+
+
+@dataclass(frozen=True)
+class _Matrix:
+    """Even elements as 2 × 2 matrices of quaternions.
+
+    Null vectors n, m with n·m = g, beside three others of one sign, whose product I commutes with
+    those.  With P± = ½(1 ± n∧m/g): a P+ + b P− + c I n + d I m ↦ (a, c; −2g I² d, b), with a, b, c,
+    d even in the three, respects products.
+    """
+
+    algebra: Algebra
+    pair: tuple[int, int]
+
+    @classmethod
+    def of(cls, algebra: Algebra) -> _Matrix | None:
+        """The matrices for an algebra, if it has such vectors."""
+        for pair in hyperbolic_pairs(algebra):
+            rest = [i for i in range(algebra.dimension) if i not in pair]
+            block = [[algebra.gram[i][j] for j in rest if j != i] for i in rest]
+            signs = {algebra.gram[i][i] > 0 for i in rest if algebra.gram[i][i]}
+            whole = all(algebra.gram[i][i] for i in rest) and not any(map(any, block))
+            if len(rest) == 3 and len(signs) == 1 and whole:
+                return cls(algebra, pair)
+        return None
+
+    @property
+    def _both(self) -> Blade:
+        return 1 << self.pair[0] | 1 << self.pair[1]
+
+    @property
+    def _volume(self) -> Blade:
+        return (1 << self.algebra.dimension) - 1 & ~self._both
+
+    @property
+    def _quaternion(self) -> list[Blade]:
+        return [b for b in range(self._volume + 1) if not b & self._both and grade(b) % 2 == 0]
+
+    @property
+    def _lower(self) -> Rational:
+        """−2g I²."""
+        square = self.algebra.blade_product(self._volume, self._volume)[0]
+        return ratio(-2 * self.algebra.gram[self.pair[0]][self.pair[1]] * square, 1)
+
+    def _beside(self, blade: Blade, null: int) -> tuple[Blade, Rational]:
+        """A I n for an even blade A: a blade and its coefficient."""
+        ((odd, x),) = self.algebra.blade_product(blade, self._volume).items()
+        ((whole, sign),) = self.algebra.outer(odd, 1 << null).items()
+        return whole, x * sign
+
+    def _across(self, blade: Blade) -> tuple[Blade, Rational]:
+        """A n∧m / g for an even blade A."""
+        whole = blade | self._both
+        gram = self.algebra.gram[self.pair[0]][self.pair[1]]
+        return whole, ratio(self.algebra.outer(blade, self._both)[whole], gram)
+
+    def _entries(self, writer: Writer, value: PolynomialMultivector) -> list[PolynomialMultivector]:
+        """a, c, −2g I² d and b, over names."""
+        a, c, d, b = found = [dict[Blade, Polynomial]() for _ in range(4)]
+        for blade in self._quaternion:
+            name = self.algebra.blade_name(blade)
+            whole, x = self._across(blade)
+            still = {0: value.get(blade, {})}
+            across = {0: poly.scaled(value.get(whole, {}), ratio(1, x))}
+            for letter, entry, sign in (("a", a, 1), ("b", b, -1)):
+                p = poly.added(still, across, sign).get(0, {})
+                entry[blade] = writer.let_polynomial(f"{letter}_{name}", p)
+            for entry, null, factor in ((c, self.pair[0], 1), (d, self.pair[1], self._lower)):
+                whole, x = self._beside(blade, null)
+                entry[blade] = poly.scaled(value.get(whole, {}), ratio(factor, x))
+        return found
+
+    def inverse(self, writer: Writer, value: PolynomialMultivector) -> dict[Blade, Expression]:
+        """By Schur's complement, of a and b or of c and d, whichever are larger.
+
+        Then what is subtracted is no larger than what it is subtracted from, block by block and for
+        any unit of length: errors are those of a change of the blocks by ε, while a quotient by
+        N² − q has those of a change by ε of the squares.
+        """
+        algebra, product = self.algebra, self.algebra.geometric
+        entries = self._entries(writer, value)
+
+        def norm(q: PolynomialMultivector) -> Expression:
+            return polynomial_expression(poly.apply_bilinear(product, q, reversed_value(q))[0])
+
+        def inverted(
+            name: str, q: PolynomialMultivector, size: Expression
+        ) -> PolynomialMultivector:
+            over = f"over_{name}"
+            writer.let(over, Quotient(ONE, size))
+            reverse = reversed_value(q)
+            return _times_name(algebra, writer, f"inverse_{name}", reverse, over)
+
+        def times(
+            name: str, x: PolynomialMultivector, y: PolynomialMultivector
+        ) -> PolynomialMultivector:
+            return _named(algebra, writer, name, poly.apply_bilinear(product, x, y))
+
+        sizes = [
+            writer.let(f"size_{letter}", norm(q)) for letter, q in zip("acdb", entries, strict=True)
+        ]
+        apart = MultiplyAdd(sizes[0], sizes[3], negative(Product(sizes[1], sizes[2])))
+        diagonal = writer.let("diagonal", apart)
+
+        def chosen(name: str, k: int, other: int) -> PolynomialMultivector:
+            picked: PolynomialMultivector = {}
+            for blade, p in entries[k].items():
+                whole = f"{name}_{algebra.blade_name(blade)}"
+                x, y = (polynomial_expression(q) for q in (p, entries[other][blade]))
+                writer.let(whole, Select(diagonal, x, y))
+                picked[blade] = {(whole,): 1}
+            return picked
+
+        # (p, q; r, s): the matrix, or its columns exchanged
+        p, q, r, s = chosen("p", 0, 1), chosen("q", 1, 0), chosen("r", 2, 3), chosen("s", 3, 2)
+        size = writer.let("size", Select(diagonal, sizes[0], sizes[1]))
+        pivot = inverted("p", p, size)
+        u, v = times("u", r, pivot), times("v", pivot, q)
+        rest = poly.added(s, poly.apply_bilinear(product, u, q), -1)
+        rest = _named(algebra, writer, "rest", rest)
+        last = inverted("rest", rest, writer.let("size_of_rest", norm(rest)))
+        right, lower = times("right", v, last), times("lower", last, u)
+        first = poly.added(pivot, poly.apply_bilinear(product, right, u))
+        first = _named(algebra, writer, "first", first)
+        # (first, −right; −lower, last), its rows exchanged where the columns were
+        signed = [
+            first,
+            *({b: poly.scaled(x, -1) for b, x in part.items()} for part in (right, lower)),
+            last,
+        ]
+
+        def entry(k: int, other: int, blade: Blade, sign: int = 1) -> Expression:
+            x, y = (polynomial_expression(poly.scaled(signed[i][blade], sign)) for i in (k, other))
+            return Select(diagonal, x, y)
+
+        out: dict[Blade, Expression] = {}
+        for blade in self._quaternion:
+            name = algebra.blade_name(blade)
+            a = writer.let(f"inverse_a_{name}", entry(0, 2, blade))
+            b = writer.let(f"inverse_b_{name}", entry(3, 1, blade))
+            out[blade] = Product(number(Fraction(1, 2)), Sum(a, b))
+            whole, x = self._across(blade)
+            out[whole] = Product(number(ratio(x, 2)), Sum(a, negative(b)))
+            for null, k, other, scale in (
+                (self.pair[0], 1, 3, 1),
+                (self.pair[1], 2, 0, ratio(1, self._lower)),
+            ):
+                whole, x = self._beside(blade, null)
+                sign = 1 if x * scale > 0 else -1
+                out[whole] = _times(magnitude(x * scale), entry(k, other, blade, sign))
+        return out
 
 
 def _inverse(
@@ -787,13 +953,8 @@ def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str)
             else:
                 length = Call("sqrt", (_norm_squared(algebra, writer, value, norm),))
             radius = writer.let("radius", length)
-            square = Sum(norm, radius)
-            if any(x < 0 for x in omega[0].values()):
-                # boosts beside half an angle near π: N < 0, and nothing may cancel
-                far = Quotient(
-                    negative(polynomial_expression(omega[0])), Sum(radius, negative(norm))
-                )
-                square = Select(norm, square, far)
+            part = polynomial_expression(omega[0])
+            square = _norm_plus_radius(algebra, writer, quad, norm, radius, part)
         root = writer.let("root", Call("sqrt", (square,)))
     out: dict[Blade, Expression] = {0: Product(half, root)}
     if not quad:
@@ -815,6 +976,25 @@ def sqrt_kernel(algebra: Algebra, operand: Element, result: Element, where: str)
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     notes = ("Not finite at M = −1, which is half a turn of the sheet from 1.",)
     return Kernel("sqrt", "√m: half the motion, √m √m = m", program, None, "", None, notes)
+
+
+def _norm_plus_radius(
+    algebra: Algebra,
+    writer: Writer,
+    quad: PolynomialMultivector,
+    norm: Expression,
+    radius: Expression,
+    omega: Expression,
+) -> Expression:
+    """N + r, r = √(N² − ω), of N + Q, Q² = ω; `quad`: Q up to a factor.
+
+    Where N < 0 only ω < 0 leaves it a root (boosts beside half an angle near π, or M ~M of what
+    hardly has an inverse): there as −ω / (|N| + r), which does not cancel.
+    """
+    if not _may_be_negative(algebra, quad):
+        return Sum(norm, radius)
+    total = writer.let("total", Sum(Call("abs", (norm,)), radius))
+    return Select(norm, total, Quotient(negative(omega), total))
 
 
 def _square_subtracted(omega: Polynomial) -> Name | None:
@@ -852,9 +1032,10 @@ def _over_root(
     norm = polynomial_expression(parts.number)
     radius = square = norm
     if parts.omega:
-        omega = negative(polynomial_expression(parts.omega))
-        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, omega),)))
-        square = Product(half, Sum(norm, radius))
+        omega = polynomial_expression(parts.omega)
+        radius = writer.let("radius", Call("sqrt", (MultiplyAdd(norm, norm, negative(omega)),)))
+        total = _norm_plus_radius(algebra, writer, parts.quad, norm, radius, omega)
+        square = Product(half, total)
     root = writer.let("root", Call("sqrt", (square,)))
     if not parts.quad:
         factor = writer.let("factor", Quotient(ONE, root))

@@ -29,6 +29,7 @@ from hamotor.codegen.program import (
     Parameter,
     Product,
     Program,
+    Sum,
     number,
     polynomial_expression,
 )
@@ -162,12 +163,17 @@ def quadratic_kernel(
 
 
 class Staging:
-    """Bindings of a program under construction: each holds the primitive part of a polynomial."""
+    """Bindings of a program under construction: each holds the primitive part of a polynomial.
 
-    def __init__(self) -> None:
+    unbounded: names beside which all others may be small, such as what translates in a unit versor.
+    """
+
+    def __init__(self, unbounded: frozenset[str] = frozenset()) -> None:
         """Start without bindings."""
         self.bindings: list[tuple[str, Expression]] = []
         self.meaning: dict[str, Polynomial] = {}
+        self._unbounded = unbounded
+        self._behind: dict[str, list[tuple[int, int]]] = {}
 
     def bind(self, name: str, polynomial: Polynomial) -> Polynomial:
         """Give a polynomial a name; returns the (scaled) name, to be used in its place."""
@@ -176,10 +182,55 @@ class Staging:
         if len(polynomial) == 1 and len(next(iter(polynomial))) <= 1:
             return polynomial
         content = poly.content(polynomial)
-        primitive = poly.scaled(polynomial, ratio(1, content))
-        self.bindings.append((name, polynomial_expression(primitive)))
+        primitive = self.in_order(poly.scaled(polynomial, ratio(1, content)))
+        self.bindings.append((name, _single_last(primitive)))
         self.meaning[name] = primitive
+        self._behind[name] = [
+            (count, sum(x in self._unbounded for x in monomial))
+            for monomial, count in zip(primitive, _roundings(len(primitive)), strict=True)
+        ]
         return {(name,): content}
+
+    def in_order(self, polynomial: Polynomial) -> Polynomial:
+        """The same terms, those last that have been rounded most often or may be largest.
+
+        A sum rounds its first terms again with every further one.  Of products of names that are
+        bound every one counts, by twice its roundings and its degree in what is unbounded.
+        """
+
+        def last(monomial: tuple[str, ...]) -> tuple[int, int]:
+            own = sum(x in self._unbounded for x in monomial)
+            behind = [pair for x in monomial for pair in self._behind.get(x, ())] or [(0, 0)]
+            degree = own + max(degree for _, degree in behind)
+            return max(2 * count + degree + own for count, degree in behind), degree
+
+        return {m: polynomial[m] for m in sorted(polynomial, key=last)}
+
+
+def _roundings(products: int) -> list[int]:
+    """How often `dot` rounds each of so many products."""
+    sums = 1 if products < 4 else 2 if products < 9 else 4
+    return [len(range(index, products, sums)) + sums.bit_length() - 1 for index in range(products)]
+
+
+def _single_last(p: Polynomial) -> Expression:
+    """The sum, its terms of one factor added last where three roundings or more would follow."""
+    single: Polynomial = {m: x for m, x in p.items() if len(m) == 1}
+    products = {m: x for m, x in p.items() if len(m) != 1}
+    if not single or len(products) < 3:
+        return polynomial_expression(p)
+    return Sum(polynomial_expression(products), polynomial_expression(single))
+
+
+def _translating(algebra: Algebra, versor: PolynomialMultivector) -> frozenset[str]:
+    """The components of null blades: a unit bounds what turns, but not them."""
+    return frozenset(
+        name
+        for blade, p in versor.items()
+        if not algebra.blade_product(blade, blade).get(0, 0)
+        for monomial in p
+        for name in monomial
+    )
 
 
 def chain_kernel(
@@ -338,7 +389,7 @@ def _commutator_first(
 ) -> SandwichForm:
     """V X ~V = X + [V, X] ~V = −X + {V, X} ~V: the (anti)commutator is multiplied by ~V."""
     versor, value = (value_of(p) for p in parameters)
-    staging = Staging()
+    staging = Staging(_translating(algebra, versor))
     moved = _bound(algebra, staging, "c", poly.apply_bilinear(kind, versor, value))
     back = reversed_value(versor)
     half = poly.apply_bilinear(algebra.geometric, moved, back)
@@ -367,7 +418,7 @@ def _commutator_last(
     turning = {b: p for b, p in versor.items() if not b & mask}
     moving = {b: p for b, p in versor.items() if b & mask}
     back = reversed_value(turning)
-    staging = Staging()
+    staging = Staging(_translating(algebra, versor))
     turned = _bound(algebra, staging, "y", poly.apply_bilinear(algebra.geometric, value, back))
     half = poly.apply_bilinear(algebra.commutator, turning, turned)
     across = poly.apply_bilinear(algebra.geometric, moving, turned)
@@ -398,7 +449,7 @@ def _sandwich(
             outputs.append((component.name, kept))
             continue
         content = 2 * poly.content(rest)
-        inner = polynomial_expression(poly.scaled(rest, ratio(2, content)))
+        inner = polynomial_expression(form.staging.in_order(poly.scaled(rest, ratio(2, content))))
         factor = number(content)
         if still[component.name]:
             outputs.append((component.name, MultiplyAdd(factor, inner, kept)))

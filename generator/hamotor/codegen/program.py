@@ -268,9 +268,10 @@ def walk(expression: Expression) -> Iterator[Expression]:
 
 
 def _split_sums(expression: Expression, inside: bool = False) -> int:
-    """How many chains of multiply-adds `dot` does as two sums, which it adds without fusing.
+    """How many sums `dot` adds to each other without fusing.
 
-    Those are the sums of four products or more and of nothing else (runtime, scalar.hpp).
+    Chains of four products or more and of nothing else are two sums, of nine or more four (runtime,
+    scalar.hpp).
     inside: the expression is the rest of a longer chain.
     """
     found = 0
@@ -280,7 +281,8 @@ def _split_sums(expression: Expression, inside: bool = False) -> int:
         while isinstance(rest, MultiplyAdd):
             products += 1
             rest = rest.c
-        found = int(isinstance(rest, Product) and products >= 3)
+        if isinstance(rest, Product):
+            found = 3 if products >= 8 else int(products >= 3)
     for child in children(expression):
         in_chain = isinstance(expression, MultiplyAdd) and child is expression.c
         found += _split_sums(child, in_chain)

@@ -130,16 +130,14 @@ template <class S>
   const S sinh_a = sqrt(boost_part - rho);
   const S cosh_a = sqrt(S(1) + sinh_a * sinh_a);
   const S turning = sqrt(turn_part);
+  const S boosting = c < S(0) ? S(-sqrt(boost_part)) : S(sqrt(boost_part));
   const S a = asinh(sinh_a);
   const S b = atan2(turning, c);
-  const S sin_b = turning / cosh_a;
-  const S cos_b = c / cosh_a;
   const S cot_a = sinh_a > S(0) ? a * cosh_a / sinh_a : S(1);
   const S cot_b = turning > S(0) ? b * c / turning : S(1);
-  const S gap = -(sinh_a * sinh_a) - sin_b * sin_b;
-  // (f₊ + f₋)/2 with a → i a
-  const S mean = (-(a * sinh_a * cos_b) - b * cosh_a * sin_b) / gap;
-  return {mean, (cot_a - cot_b) / gap};
+  // (f₊ + f₋)/2 with a → i a; sinh² a + sin² b is the sum of both λ
+  const S mean = mul_add(a, boosting, b * turning) / spread;
+  return {mean, (cot_b - cot_a) / spread};
 }
 
 /// The same where √ρ is 0 or no number: S ± 2 c √ρ cannot cancel.

@@ -109,6 +109,29 @@ template <class S, class... Rest>
   return dot_in_turn(mul_add(a, b, odd), mul_add(c, d, even), rest...);
 }
 
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_in_four(const S& first, const S& second,
+                                                     const S& third, const S& fourth) noexcept {
+  return (first + second) + (third + fourth);
+}
+
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_in_four(const S& first, const S& second,
+                                                     const S& third, const S& fourth, const S& a,
+                                                     const S& b, const Rest&... rest) noexcept {
+  return dot_in_four(second, third, fourth, mul_add(a, b, first), rest...);
+}
+
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_in_four(const S& first, const S& second,
+                                                     const S& third, const S& fourth, const S& a,
+                                                     const S& b, const S& c, const S& d, const S& e,
+                                                     const S& f, const S& g, const S& h,
+                                                     const Rest&... rest) noexcept {
+  return dot_in_four(mul_add(a, b, first), mul_add(c, d, second), mul_add(e, f, third),
+                     mul_add(g, h, fourth), rest...);
+}
+
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot_of_products(const S& a, const S& b,
                                                          const Rest&... rest) noexcept {
@@ -116,17 +139,27 @@ template <class S, class... Rest>
 }
 
 template <class S, class... Rest>
-  requires(sizeof...(Rest) >= 4)
+  requires(sizeof...(Rest) >= 4 && sizeof...(Rest) <= 12)
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot_of_products(const S& a, const S& b, const S& c,
                                                          const S& d, const Rest&... rest) noexcept {
   return dot_in_turn(a * b, c * d, rest...);
+}
+
+template <class S, class... Rest>
+  requires(sizeof...(Rest) >= 10)
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_of_products(const S& a, const S& b, const S& c,
+                                                         const S& d, const S& e, const S& f,
+                                                         const S& g, const S& h,
+                                                         const Rest&... rest) noexcept {
+  return dot_in_four(a * b, c * d, e * f, g * h, rest...);
 }
 
 }  // namespace detail
 
 /// a₁ b₁ + a₂ b₂ + … by multiply-adds in this order; from four products on, as two sums of every
 /// other product, a₁ b₁ + a₃ b₃ + … and a₂ b₂ + a₄ b₄ + …: half as many operations wait for each
-/// other, and a chain of motor products takes two thirds of the time.
+/// other, and a chain of motor products takes two thirds of the time.  From nine products on, as
+/// four sums, (1 + 2) + (3 + 4): no product of up to sixteen is rounded more than six times.
 /// With an odd number of arguments the first one is added, in one sum: c + a₁ b₁ + a₂ b₂ + ….
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot(const S& x, const Rest&... rest) noexcept {
