@@ -3,8 +3,8 @@
 A chunk (4096 members) is what one thread steps at a time and what statistics are summed over; a
 part (65,536) is what is written at a time, and what another process or machine computes.  Both
 begin at multiples of their size, and all merging goes in the order of the members, so that the bits
-of every result are the same for any number of threads and any engine.  Memory holds two parts,
-whatever the number of members.
+of every result are the same for any number of threads and any engine.  Memory holds the parts that
+keep the threads busy and one more, whatever the number of members.
 """
 
 from __future__ import annotations
@@ -138,6 +138,7 @@ class Tally:
     """(members, times, columns), NaN where a member had failed."""
     member_steps: int = 0
     stepping_s: float = 0.0
+    """Of processors."""
 
     @staticmethod
     def none(job: Job, description: Description) -> Tally:
@@ -285,13 +286,14 @@ def run_chunk(library: SceneLibrary, job: Job, part: Part, first: int, meter: Me
         for time_, target in enumerate(job.recorded):
             while done < target and not meter.stopped:
                 asked = min(stretch, target - done)
-                began = time.perf_counter()
+                began, worked = time.perf_counter(), time.thread_time()
                 going = live.advance(asked)
+                worked = time.thread_time() - worked
                 spent = time.perf_counter() - began
                 done += asked
                 tally.member_steps += asked * going
-                tally.stepping_s += spent
-                meter.add(asked * going, spent)
+                tally.stepping_s += worked
+                meter.add(asked * going, worked)
                 stretch = max(1, int(min(8 * asked, asked * _STRETCH_S / max(spent, 1e-9))))
             if done < target:
                 break
@@ -408,7 +410,8 @@ def run_parts(
                 for first in chunks_of(part)
             ]
 
-        waiting = deque(submit(number) for number in range(min(2, job.parts)))
+        ahead = 1 + -(-threads // (PART // CHUNK))
+        waiting = deque(submit(number) for number in range(min(ahead, job.parts)))
         number = len(waiting)
         while waiting:
             part, futures = waiting.popleft()
