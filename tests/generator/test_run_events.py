@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -185,6 +186,8 @@ def test_events_of_a_general_scene_are_found_with_fixed_and_with_chosen_steps(
     assert run.position()[:, 0] == pytest.approx(np.cos(run.t), abs=1e-12)
     assert run.report["own_steps"] != run.report["steps"] == 10
     assert "steps of its own choice" in run.summary()
+    as_the_scene_says = replace(simulation, method="rkmk87", step=1.0, local_tolerance=1e-13)
+    assert as_the_scene_says.run(times=[0.5]).report["local_tolerance"] == 1e-13
     met = simulation.run(method="rkmk87", tolerance=1e-10)
     assert met.report["tolerance"]["achieved"] <= 1e-10
     rungs = [rung["local_tolerance"] for rung in met.report["tolerance"]["ladder"]]

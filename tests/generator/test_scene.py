@@ -176,6 +176,8 @@ def test_a_planar_body_turns_anticlockwise() -> None:
     assert body.momentum == pytest.approx((0.25 * 3 + 0.1 * 2 * 2.3, 2.0, 2 * 2.3))
     assert body.rate == pytest.approx([3, 1, 2])
     assert scene(text).group is GROUPS["SE2"]
+    chosen = 'step = 0.1\n    method = "rkmk54"\n    local_tolerance = 1e-6'
+    assert scene(text.replace("tolerance = 1e-9", chosen)).time.local_tolerance == 1e-6
 
 
 def test_the_state_of_a_fixed_point_is_a_rotor_and_an_angular_momentum() -> None:

@@ -136,6 +136,8 @@ MISTAKES: dict[str, tuple[str, str, str, list[str]]] = {
     "step longer than the run": (TOP, "step = 0.01", "step = 11", ["step: 11 is longer than end = 10"]),
     "absurdly many steps": (TOP, "step = 0.01", "step = 1e-12", ["step: end / step is 1e+13; at most 1e+12 steps"]),
     "tolerance zero": (TOP, "step = 0.01", "tolerance = 0", ["tolerance: must be positive"]),
+    "local tolerance of a fixed step": (TOP, "step = 0.01", 'step = 0.01\nmethod = "rkmk4"\nlocal_tolerance = 1e-9', ["local_tolerance: needs a method that chooses its steps", 'not "rkmk4"']),
+    "local tolerance and tolerance": (TOP, "step = 0.01", 'tolerance = 1e-9\nmethod = "taylor"\nlocal_tolerance = 1e-9', ["local_tolerance: is for a run in steps"]),
     "step and tolerance": (TOP, "step = 0.01", "step = 0.01\ntolerance = 1e-9", ['"step" and "tolerance" contradict each other']),
     "every zero": (TOP, "every = 2", "every = 0", ["[output]: every: must be at least 1", "not the number 0"]),
     "every a fraction": (TOP, "every = 2", "every = 2.5", ["every: must be an integer, not the number 2.5"]),

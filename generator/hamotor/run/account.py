@@ -152,6 +152,8 @@ def _time(scene: Scene | GeneralScene) -> list[str]:
         lines.append(f"step       {time.step:g} s")
     if time.tolerance is not None:
         lines.append(f"tolerance  {time.tolerance:g}")
+    if time.local_tolerance is not None:
+        lines.append(f"local tol. {time.local_tolerance:g} 1/s")
     return [*lines, f"method     {time.method}", f"recorded   {_recorded(scene.output)}"]
 
 

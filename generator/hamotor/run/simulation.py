@@ -66,6 +66,8 @@ class Simulation:
     has_events: bool = False
     structure: str = ""
     """Its class of `hamotor.scene.structure`, for the choice of a method."""
+    local_tolerance: float | None = None
+    """1/s, of the scene's method, which chooses its steps."""
     exact_digits: tuple[str, ...] = ()
     """The initial state in 60 digits."""
     ensemble: Ensemble = ALIKE
@@ -225,6 +227,8 @@ class Simulation:
             step = abs(end) / ROWS if step is None else step
         elif step is None and tolerance is None:
             step, tolerance = self.step, self.tolerance
+        if method is None and tolerance is None and local_tolerance is None:
+            local_tolerance = self.local_tolerance
         if every is None and times is None and interval is None:
             interval = self.interval
             if self.times is not None:  # an earlier end than the scene's leaves the later ones out
@@ -403,6 +407,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "end": found.time.end,
             "step": found.time.step,
             "tolerance": found.time.tolerance,
+            "local_tolerance": found.time.local_tolerance,
             "method": found.time.method,
             "every": found.output.every,
             "times": found.output.times,

@@ -107,6 +107,8 @@ class Time:
     """Of the final state, verified by a second, finer run. None where a step is given."""
     method: str
     """`auto`, or a method's name."""
+    local_tolerance: float | None = None
+    """Of a method that chooses its steps, 1/s; beside a step, at which it delivers the state."""
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from hamotor.scene.exact import decimal, rounded, written
 from hamotor.scene.general import GeneralScene
 from hamotor.scene.groups import ALGEBRAS, groups_of
 from hamotor.scene.interactions import Gravity, Interaction, Potential, Spring
-from hamotor.scene.methods import METHOD_NAMES
+from hamotor.scene.methods import METHOD_NAMES, METHODS
 from hamotor.scene.model import Body, Output, Scene, Time
 from hamotor.scene.motors import (
     Matrix,
@@ -564,9 +564,23 @@ def _time(table: Table) -> Time:
             )
     else:
         tolerance = table.number("tolerance")
+    method = table.choice("method", METHOD_NAMES, "methods")
     return Time(
         end=end,
         step=step,
         tolerance=tolerance,
-        method=table.choice("method", METHOD_NAMES, "methods"),
+        method=method,
+        local_tolerance=_local_tolerance(table, method) if table.has("local_tolerance") else None,
     )
+
+
+def _local_tolerance(table: Table, method: str) -> float:
+    able = [m.name for m in METHODS if m.error_controlled]
+    if table.has("tolerance"):
+        table.fail("is for a run in steps; a tolerance is met by any method", "local_tolerance")
+    if method not in able:
+        table.fail(
+            f'needs a method that chooses its steps: {", ".join(able)}; not "{method}"',
+            "local_tolerance",
+        )
+    return table.number("local_tolerance")

@@ -488,6 +488,15 @@ TIME = Section(
             active=False,
         ),
         Key("method", "one of", ", ".join(METHOD_NAMES), default='"auto"'),
+        Key(
+            "local_tolerance",
+            "positive",
+            "beside step, for a method that chooses its steps: the error it allows itself;"
+            " it delivers the state every step. Nothing is verified",
+            unit="1/s",
+            example="1e-10",
+            active=False,
+        ),
     ),
 )
 
