@@ -379,6 +379,8 @@ class Gauss {
     if constexpr (has_newton) {
       if (newton_.on) noise = newton_.equations.solve(table, noise);
     }
+    // Where rounding moves the stages by more, they say nothing.
+    if (!(S(64) * size(noise) < S(0.01)) || !(size(by) < S(0.01))) return false;
     for (std::size_t k = 0; k < unknowns; ++k) {
       const S bound = S(64) * largest_of(noise, k) + S(65536) * epsilon * largest_of(slopes_, k);
       if (!(largest_of(by, k) <= bound)) return false;
@@ -434,7 +436,8 @@ class Gauss {
                            const Rate eta = Chart(half_way_[i]).body_rate(by);
                            moved.motors[i] =
                                moved.motors[i] + detail::motor_change(moved.motors[i], eta);
-                           m[i] = m[i] + coadjoint(eta, m[i]);
+                           // What the step began with is seen from there.
+                           m[i] = m[i] + coadjoint(eta, Ad_star(half_[i], state.momenta[i]));
                          });
     };
     Matrix mean = common(0);
