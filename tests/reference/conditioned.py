@@ -483,22 +483,18 @@ def worst_defect(algebra: str, points: int, *, fused: bool) -> dict[str, float]:
     return worst
 
 
-# ---------------------------------------------------------------- what exceeds the bounds
-
-ROUNDING = "at few points, by less than a fifth and by rounding alone"
-EXCEPTIONS: Mapping[str, str] = {"log pga4": ROUNDING}
-"""Function name and algebra → where its error is larger than the bound.  See ulp.md."""
+# ---------------------------------------------------------------- the published table
 
 
 def excepted(found: KernelMeasurement) -> bool:
-    """Whether the table names this kernel's function as one that exceeds the bound somewhere."""
-    return _mark(found.kernel.name, found.algebra) != ""
+    """Whether no bound is claimed for this kernel, whose function the table marks."""
+    return _mark(found.kernel.name) != ""
 
 
 def published(table: str) -> dict[tuple[str, str, str], float]:
     """Function name, algebra and scalar → the largest error in the second table of ulp.md."""
     rows = re.findall(
-        r"^\| `(\w+)`(?: [†‡])? \| (\w+) \| \d+ \| (\S+) \| \S+ \| (\S+) \|", table, re.MULTILINE
+        r"^\| `(\w+)`(?: ‡)? \| (\w+) \| \d+ \| (\S+) \| \S+ \| (\S+) \|", table, re.MULTILINE
     )
     return {
         (name, algebra, scalar): float(error)
@@ -507,13 +503,8 @@ def published(table: str) -> dict[tuple[str, str, str], float]:
     }
 
 
-def _mark(name: str, algebra: str) -> str:
-    if name.endswith("_lean"):
-        return " ‡"
-    return " †" if f"{name} {algebra}" in EXCEPTIONS else ""
-
-
-# ---------------------------------------------------------------- the published table
+def _mark(name: str) -> str:
+    return " ‡" if name.endswith("_lean") else ""
 
 
 def introduction() -> str:
@@ -566,7 +557,7 @@ def table(found: Sequence[KernelMeasurement], before: str = "") -> str:
         rows[polynomial][name, algebra] = _cells(of_one)
     measured = {m.algebra for m in found}
     for name, algebra, cells in re.findall(
-        r"^\| `(\w+)`(?: [†‡])? \| (\w+) \| (.*) \|$", before, re.MULTILINE
+        r"^\| `(\w+)`(?: ‡)? \| (\w+) \| (.*) \|$", before, re.MULTILINE
     ):
         if algebra not in measured:
             rows[name in PRODUCTS][name, algebra] = cells
@@ -578,12 +569,7 @@ def table(found: Sequence[KernelMeasurement], before: str = "") -> str:
             "|---|---|---|---|---|---|---|---|",
         ]
         for (name, algebra), cells in sorted(of_kind.items()):
-            lines.append(f"| `{name}`{_mark(name, algebra)} | {algebra} | {cells} |")
+            lines.append(f"| `{name}`{_mark(name)} | {algebra} | {cells} |")
         blocks.append("\n".join(lines))
-    reasons: dict[str, list[str]] = {}
-    for name, reason in EXCEPTIONS.items():
-        reasons.setdefault(reason, []).append(name)
-    for reason, names in reasons.items():
-        blocks.append(f"† {', '.join(names)}: larger {reason}.")
     blocks.append("‡ The fewest operations: no bound is claimed; see each kernel's documentation.")
     return "\n\n".join(blocks)
