@@ -21,13 +21,14 @@ from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, toy, toy_sta
 import hamotor
 from hamotor.errors import ToolError, UsageError
 from hamotor.run import cluster
+from hamotor.run.account import account
 from hamotor.run.ensemble import CHUNK, PART, Job, Part
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
 from hamotor.run.library import SceneLibrary
 from hamotor.run.sampling import starts
 from hamotor.run.simulation import Simulation
 from hamotor.run.statistics import Moments
-from hamotor.scene import parse_scene
+from hamotor.scene import parse_scene, read_scene
 from hamotor.scene.model import Scene
 from hamotor.scene.motors import motor_of, rotation_matrix
 
@@ -421,6 +422,15 @@ def test_members_have_parameters_of_their_own(bounce: Simulation) -> None:
         np.testing.assert_allclose(found["energy"], energy, rtol=1e-7)
     alone = run_ensemble(bounce, members, member=13, seed=4)
     assert (alone.states[0] == run.states[13]).all()
+
+
+def test_show_says_in_what_members_differ(bounce: Simulation) -> None:
+    assert bounce.read is not None
+    shown = account(bounce.read())
+    assert "members differ in\n  parameters: 2.stiffness, 1.acceleration_z\n  by 1 random" in shown
+    debris = account(read_scene("tumbling_debris"))
+    assert "  fragment: position, orientation, velocities\n  by 13 random numbers each" in debris
+    assert "members differ" not in account(read_scene("dzhanibekov"))
 
 
 def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:

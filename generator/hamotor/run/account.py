@@ -37,8 +37,36 @@ def _general(scene: GeneralScene) -> str:
     blocks.append(["left out", *(f"  {line}" for line in _not_in(scene))])
     blocks.append(["cost of an evaluation", *_cost(scene)])
     blocks += _events(scene)
+    blocks += _members(scene)
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def _members(scene: Scene | GeneralScene) -> list[list[str]]:
+    """What differs from member to member of an ensemble, where anything does."""
+    from hamotor.run.sampling import numbers_each
+    from hamotor.scene import Scene
+
+    whole = isinstance(scene, Scene) and scene.draws_parameters
+    ensemble = scene.general.ensemble if isinstance(scene, Scene) and whole else scene.ensemble
+    lines = []
+    size = len(scene.group.motor) + len(scene.group.generators)
+    for body in ensemble.bodies:
+        drawn = {
+            "position": body.place,
+            "orientation": body.turn,
+            "scale": body.growth,
+            "velocities": body.rates,
+            "momentum": body.momenta,
+        }
+        name = scene.bodies[body.motor // size].name
+        lines.append(f"  {name}: {', '.join(what for what, draw in drawn.items() if draw)}")
+    if ensemble.parameters:
+        names = ", ".join(parameter.name for parameter in ensemble.parameters)
+        lines.append(f"  parameters: {names}")
+    if not lines:
+        return []
+    return [["members differ in", *lines, f"  by {numbers_each(ensemble)} random numbers each"]]
 
 
 def _cost(scene: GeneralScene) -> list[str]:
@@ -94,6 +122,7 @@ def _rigid(scene: Scene) -> str:
     blocks.append(["conserved", *_conserved(scene)])
     blocks.append(["left out", *(f"  {line}" for line in _left_out(scene))])
     blocks += _events(scene)
+    blocks += _members(scene)
     blocks.append(["time", *(f"  {line}" for line in _time(scene))])
     return "\n\n".join("\n".join(block) for block in blocks)
 
