@@ -88,8 +88,12 @@ using MomentumOf = Dense<Tables, typename Tables::Momentum, S>;
 template <class Tables, class S>
 struct Defect {
   using Scalar = S;
+  static constexpr std::array<std::string_view, 1> names{"s"};  ///< of the first component
   Multivector<Tables::vectors, S> values;
   [[nodiscard]] constexpr const auto& components() const noexcept { return values; }
+  [[nodiscard]] static constexpr Defect from(const Multivector<Tables::vectors, S>& x) noexcept {
+    return {values};
+  }
   [[nodiscard]] friend constexpr Defect operator+(const Defect& a, const Defect& b) noexcept {
     Defect sum = a;
     for (std::size_t k = 0; k < sum.values.size(); ++k) sum.values[k] += b.values[k];
