@@ -66,6 +66,8 @@ PERTURBED_AT: Final = (0.0, 0.25, 0.5, 0.75, 0.98)
 """Parts of the way at which the state is moved, for the condition."""
 ROUNDINGS: Final = 16.0
 """Roundings of a step that the condition may multiply."""
+MOMENTA_ROUNDINGS: Final = 256.0
+"""Of a step, in units of the largest momentum that the motor's lever makes."""
 UNRESOLVED: Final = 0.1
 GROWTH: Final = 3.0
 ORDER_SLACK: Final = 0.7
@@ -429,7 +431,7 @@ def _judged_at(
         lever = max(
             1.0, float(np.abs(np.concatenate([coarse.motor(b) for b in coarse.bodies])).max())
         )
-        momenta_bound = 4 * ROUNDINGS * EPSILON["double"] * math.sqrt(steps) * lever**2
+        momenta_bound = MOMENTA_ROUNDINGS * EPSILON["double"] * math.sqrt(steps) * lever**2
         figures["momenta"] = momenta
         if momenta > momenta_bound:
             failures.append(f"momenta change by {momenta:.1e}, more than {momenta_bound:.1e}")
