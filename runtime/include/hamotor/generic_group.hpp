@@ -92,7 +92,7 @@ struct Defect {
   Multivector<Tables::vectors, S> values;
   [[nodiscard]] constexpr const auto& components() const noexcept { return values; }
   [[nodiscard]] static constexpr Defect from(const Multivector<Tables::vectors, S>& x) noexcept {
-    return {values};
+    return {x};
   }
   [[nodiscard]] friend constexpr Defect operator+(const Defect& a, const Defect& b) noexcept {
     Defect sum = a;
