@@ -46,16 +46,21 @@ template <class Defect>
   return worst;
 }
 
-/// M M~ − 1, rounded as its terms are: for steppers that round M itself in every step.
+/// M M~ − 1, rounded as its terms are: for steppers that round M itself in every step.  Products by
+/// table have no other.
 template <class Motor>
 [[nodiscard]] HAMOTOR_INLINE constexpr auto rounded_defect(const Motor& m) noexcept {
   using S = typename Motor::Scalar;
-  const auto twice_square = unit_defect_change(m, m);
-  auto defect = twice_square.components();
-  static_assert(twice_square.names[0] == "s");
-  defect[0] = mul_add(S(0.5), defect[0], S(-1));
-  for (std::size_t k = 1; k < defect.size(); ++k) defect[k] = S(0.5) * defect[k];
-  return decltype(unit_defect_change(m, m))::from(defect);
+  using Defect = decltype(unit_defect_change(m, m));
+  if constexpr (requires { Defect::names; }) {
+    auto defect = unit_defect_change(m, m).components();
+    static_assert(Defect::names[0] == "s");
+    defect[0] = mul_add(S(0.5), defect[0], S(-1));
+    for (std::size_t k = 1; k < defect.size(); ++k) defect[k] = S(0.5) * defect[k];
+    return Defect::from(defect);
+  } else {
+    return unit_defect(m);
+  }
 }
 
 template <class S>
