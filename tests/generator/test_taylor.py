@@ -419,6 +419,23 @@ def test_a_collision_stops_the_run(tmp_path: Path) -> None:
         assert run.failure()[0] in {Failure.STEP_TOO_SHORT, Failure.NOT_FINITE}
 
 
+@pytest.mark.parametrize("faster", [2.0**60, 2.0**-60])
+def test_a_free_motion_is_the_same_at_any_speed(
+    problems: Callable[[str], Any], faster: float
+) -> None:
+    # Per s, coefficients of order 34 would exceed the range of a double, or vanish.
+    library, start, _ = problems("P1")
+    ends = []
+    for speed in (1.0, faster):
+        state = np.concatenate([start[:8], speed * start[8:]])
+        with library.start("taylor", step=10.0 / speed, state=state) as run:
+            assert run.advance(1, 0, None) == 1
+            ends.append(run.state())
+            taken = run.steps()
+    assert taken > 5
+    assert np.abs(ends[1][:8] - ends[0][:8]).max() < 1e-12 * np.abs(ends[0][:8]).max()
+
+
 def test_time_runs_backwards(problems: Callable[[str], Any]) -> None:
     library, start, _ = problems("P4")
     with library.start("taylor", step=5.0, state=start) as run:

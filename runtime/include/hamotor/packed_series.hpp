@@ -75,13 +75,14 @@ class PackedSeries {
  public:
   using Coordinates = std::array<S, width>;
 
-  /// Coefficients of orders 1 … p of the motion through x[0].
+  /// Coefficients of orders 1 … p of the motion through x[0], for time in `unit`, s.
   ///
   /// Flat: rows that are passed to calls return through memory.
   template <std::size_t most>
-  [[gnu::flatten]] void expand(std::array<Coordinates, most>& x, std::size_t p) noexcept {
+  [[gnu::flatten]] void expand(std::array<Coordinates, most>& x, std::size_t p, S unit) noexcept {
     X now{};
     for (std::size_t c = 0; c < packs; ++c) now[c] = load<S>(x[0].data() + 8 * c);
+    const V in_units = V{} + unit;
     X change{};
     for (std::size_t c = 0; c < packs; ++c) change[c] = load<S>(Field::constants.data() + 8 * c);
     at_0_.fixed = fixed_factors(now);
@@ -94,13 +95,13 @@ class PackedSeries {
     });
     add_linear(now, change);
     for (std::size_t k = 1;; k += 2) {
-      put(k, change, now, x);
+      put(k, in_units, change, now, x);
       if (k == p) return;
       Rows sums{};
       Rows later{};
       if (k > 1) add_inner(k, sums, later);
       change = derivatives(k, now, sums);
-      put(k + 1, change, now, x);
+      put(k + 1, in_units, change, now, x);
       if (k + 1 == p) return;
       add(1, k, later);
       if (k > 1) add(k, 1, later);
@@ -168,10 +169,10 @@ class PackedSeries {
 
   /// Coefficients of order k from those of the derivatives.
   template <std::size_t most>
-  HAMOTOR_INLINE static void put(std::size_t k, const X& change, X& now,
+  HAMOTOR_INLINE static void put(std::size_t k, const V& unit, const X& change, X& now,
                                  std::array<Coordinates, most>& x) noexcept {
     for (std::size_t c = 0; c < packs; ++c) {
-      now[c] = reciprocals[k] * change[c];
+      now[c] = (unit * reciprocals[k]) * change[c];
       store<S>(x[k].data() + 8 * c, now[c]);
     }
   }

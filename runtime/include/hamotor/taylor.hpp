@@ -61,6 +61,9 @@ namespace detail {
 /// where the time of a step goes as p²: here most of it goes as p. The polynomial of a step is
 /// dense output: what is asked for within its reach is evaluated, whatever the step asked for.
 /// Steps are increments with compensated sums. Without a tolerance, that of the scalar.
+///
+/// Coefficients are per power of a unit of time near the reach: per s, those of order 19 of a
+/// motion at 1000 rad/s exceed a float.
 template <AnalyticSystem System>
 class Taylor {
   using S = typename System::Scalar;
@@ -135,9 +138,6 @@ class Taylor {
   /// How far the polynomial at hand is used in either direction of time, s.
   [[nodiscard]] constexpr const S& reach() const noexcept { return reach_; }
 
-  /// Taylor coefficients of the coordinates about the start of the polynomial at hand, by order.
-  [[nodiscard]] constexpr const auto& coefficients() const noexcept { return coefficients_; }
-
  private:
   using Row = std::array<S, lanes>;
 
@@ -192,23 +192,64 @@ class Taylor {
 
   /// x(offset) − x(0).
   [[nodiscard]] constexpr Coordinates increment(const S& offset) const noexcept {
+    const S units = offset / unit_;
     Coordinates sum = coefficients_[static_cast<std::size_t>(length_)];
     for (std::size_t k = static_cast<std::size_t>(length_) - 1; k > 0; --k) {
-      for (std::size_t i = 0; i < n; ++i) sum[i] = mul_add(sum[i], offset, coefficients_[k][i]);
+      for (std::size_t i = 0; i < n; ++i) sum[i] = mul_add(sum[i], units, coefficients_[k][i]);
     }
-    for (std::size_t i = 0; i < n; ++i) sum[i] = sum[i] * offset;
+    for (std::size_t i = 0; i < n; ++i) sum[i] = sum[i] * units;
     return sum;
   }
 
+  /// Expands about coefficients_[0], again where the unit turns out to be far from the reach.
   constexpr void expand() noexcept {
     ++steps_;
-    note_evaluations<S>(length_);
-    if constexpr (detail::is_packed<Recurrence, S>) {
-      rows_.expand(coefficients_, static_cast<std::size_t>(length_));
-      reach_ = reach_of_coefficients();
-    } else {
-      expand_node_by_node();
+    for (int unit_changes = 0;; ++unit_changes) {
+      note_evaluations<S>(length_);
+      if constexpr (detail::is_packed<Recurrence, S>) {
+        rows_.expand(coefficients_, static_cast<std::size_t>(length_), unit_);
+      } else {
+        expand_node_by_node();
+      }
+      const S reach = reach_of_coefficients();
+      const S unit = unit_changes < 4 ? unit_near(reach) : unit_;
+      if (unit == unit_) {
+        reach_ = select(reach < unlimited(), reach * unit_, reach);
+        return;
+      }
+      unit_ = unit;
     }
+  }
+
+  /// The unit of time for coefficients of which this, in units, is the reach: a power of 2 s, and
+  /// the one at hand unless it is so far off that coefficients might overflow or vanish.
+  [[nodiscard]] constexpr S unit_near(S reach) const noexcept {
+    const auto p = static_cast<std::size_t>(length_);
+    if (!(is_finite(p) && reach > S(0) && reach < unlimited())) {
+      std::size_t top = p;
+      while (top > 0 && !(is_finite(top) && is_moving(top))) --top;
+      if (top == 0) return unit_;
+      reach = radius(top);
+    }
+    const S longest = unlimited() / S(2);
+    const S wanted = reach * unit_;
+    if (!(wanted < longest && wanted > S(1) / longest)) return unit_;
+    if (S(16) * reach > S(1) && reach < S(16)) return unit_;
+    S unit = unit_;
+    while (unit > wanted) unit = unit / S(2);
+    while (unit + unit < wanted) unit = unit + unit;
+    return unit;
+  }
+
+  [[nodiscard]] constexpr bool is_finite(std::size_t k) const noexcept {
+    bool result = true;
+    for (const S& x : coefficients_[k]) result &= x - x == S(0);
+    return result;
+  }
+
+  [[nodiscard]] constexpr bool is_moving(std::size_t k) const noexcept {
+    const Sizes found = sizes(k);
+    return std::any_of(found.begin(), found.end(), [](const S& x) { return x > S(0); });
   }
 
   constexpr void expand_node_by_node() noexcept {
@@ -216,16 +257,15 @@ class Taylor {
     Coordinates change{};
     Row sums{};
     Recurrence::first(coefficients_[0], known, change);
-    coefficients_[1] = change;
+    for (std::size_t i = 0; i < n; ++i) coefficients_[1][i] = unit_ * change[i];
     for (std::size_t k = 1; k < static_cast<std::size_t>(length_); ++k) {
       add_products(k, sums);
       const S over = S(1) / S(static_cast<int>(k));
       Recurrence::next(S(static_cast<int>(k)), over, coefficients_[k], known, sums.data(),
                        rows_.u[k].data(), rows_.v[k].data(), change);
-      const S over_next = S(1) / S(static_cast<int>(k + 1));
+      const S over_next = unit_ / S(static_cast<int>(k + 1));
       for (std::size_t i = 0; i < n; ++i) coefficients_[k + 1][i] = over_next * change[i];
     }
-    reach_ = reach_of_coefficients();
   }
 
   /// Σ u_j v_{k−j} over 0 < j < k, the newest coefficients last.
@@ -260,14 +300,15 @@ class Taylor {
     return result;
   }
 
-  /// The step whose last three terms stay below the tolerance times the size of the coordinates,
-  /// which is what they have or reach within a step as long as the last one.
+  /// The step, in units, whose last three terms stay below the tolerance times the size of the
+  /// coordinates, which is what they have or reach within a step as long as the last one.
   [[nodiscard]] constexpr S reach_of_coefficients() const noexcept {
     const auto p = static_cast<std::size_t>(length_);
-    const S span = steps_ > 1 && reach_ < unlimited() ? reach_ : radius() / S(8);
+    const S span = steps_ > 1 && reach_ < unlimited() ? reach_ / unit_ : radius(p) / S(8);
     const Sizes at_0 = sizes(0);
     const Sizes at_1 = sizes(1);
     const Sizes at_2 = sizes(2);
+    const S log_tolerance = tolerance_ > S(0) ? log_tolerance_ + scalar::log(unit_) : S(0);
     S shortest = unlimited();
     for (std::size_t m = p - 2; m <= p; ++m) {
       const Sizes last = sizes(m);
@@ -281,7 +322,7 @@ class Taylor {
       const S log_ratio = scalar::log(ratio);
       S exponent = (log_epsilon_ - log_ratio) / S(static_cast<int>(m));
       if (tolerance_ > S(0)) {
-        const S asked = (log_tolerance_ - log_ratio) / S(static_cast<int>(m) - 1);
+        const S asked = (log_tolerance - log_ratio) / S(static_cast<int>(m) - 1);
         exponent = select(asked > exponent, asked, exponent);
       }
       shortest = select(shortest > exponent, exponent, shortest);
@@ -289,13 +330,12 @@ class Taylor {
     return select(shortest < unlimited(), scalar::exp(shortest), unlimited());
   }
 
-  /// Of convergence, about, before there was any step.
-  [[nodiscard]] constexpr S radius() const noexcept {
-    const auto p = static_cast<std::size_t>(length_);
+  /// Of convergence, about, in units, from coefficients of up to order p.
+  [[nodiscard]] constexpr S radius(std::size_t p) const noexcept {
     S shortest = unlimited();
     for (std::size_t j = 0; j < 3; ++j) {
       const Sizes first = sizes(j);
-      for (std::size_t m = p - 2; m <= p; ++m) {
+      for (std::size_t m = std::max(p, j + 3) - 2; m <= p; ++m) {
         const Sizes last = sizes(m);
         for (std::size_t g = 0; g < kinds; ++g) {
           if (!(first[g] > S(0)) || !(last[g] > S(0))) continue;
@@ -314,6 +354,7 @@ class Taylor {
   S tolerance_ = S(0);
   S log_tolerance_ = S(0);
   S log_epsilon_ = scalar::log(scalar::Limits<S>::epsilon());
+  S unit_ = S(1);
   S reach_ = S(0);
   S offset_ = S(0);
   S time_ = S(0);
