@@ -458,6 +458,7 @@ def _run_ensemble(parsed: argparse.Namespace) -> int:
             scalar=parsed.scalar,
             out=parsed.out or str(Path("runs") / f"{simulation.name}_ensemble"),
             csv=parsed.csv,
+            pictures=not parsed.no_pictures,
             progress=True,
         )
     except EnsembleFailed as failure:

@@ -39,6 +39,8 @@ _STRETCH_S = 0.1
 _FIRST_STEPS = 16
 _MOST_SAMPLED = 1 << 23
 """Numbers kept for quantiles: 64 MiB."""
+DRAWN = 2000
+"""Members kept for the picture where no quantiles are asked for."""
 _MOST_STATISTICS = 1 << 22
 
 
@@ -85,10 +87,9 @@ class Job:
         return found if self.ensemble.parameters else (found[0], None)
 
     def sampled(self, columns: int) -> int:
-        """How many members, from the first, the quantiles are of."""
-        if not self.ensemble.quantiles:
-            return 0
-        return min(self.members, PART, _MOST_SAMPLED // (len(self.recorded) * columns))
+        """How many members, from the first, quantiles and the picture are of."""
+        wanted = PART if self.ensemble.quantiles else DRAWN
+        return min(self.members, wanted, _MOST_SAMPLED // (len(self.recorded) * columns))
 
     @property
     def steps(self) -> int:

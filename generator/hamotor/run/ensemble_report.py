@@ -87,7 +87,7 @@ def ensemble_report(
             "random_numbers_each": 0 if job.given is not None else numbers_each(job.ensemble),
             "chunk": CHUNK,
             "kept": sorted(k for k in job.keep if k < job.first + counts["begun"]),
-            "quantiles_of_members": len(total.sample),
+            "quantiles_of_members": len(total.sample) if job.ensemble.quantiles else 0,
             "lanes": 1 if how is None else how.lanes,
             "isa": "" if how is None else how.isa,
             "engine": origin.engine,
@@ -220,6 +220,7 @@ def _files(folder: Path, said: Mapping[str, Any]) -> list[str]:
         ("statistics.csv", "statistics.csv"),
         ("states", f"states/ ({said['ensemble']['begun']:,} members)"),
         ("failures.parquet", "failures.parquet"),
+        ("cloud.png", "cloud.png"),
         ("members", f"members/ ({len(kept)} trajector{'y' if len(kept) == 1 else 'ies'})"),
     ):
         if (folder / name).exists():

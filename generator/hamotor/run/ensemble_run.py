@@ -203,6 +203,7 @@ def run_ensemble(
     scalar: str = "double",
     out: str | PathLike[str] | None = None,
     csv: bool = False,
+    pictures: bool = True,
     progress: bool | Progress = False,
 ) -> EnsembleRun:
     """Integrate many members of a scene from t = 0 to `end` (s); what is not given, the scene says.
@@ -217,8 +218,8 @@ def run_ensemble(
 
     `threads` of this machine (all if not given); or `engine` "dask" computes on the workers of
     `scheduler` (its address; without one, processes on this machine).  No result depends on either.
-    With `out` the folder then holds run.json, statistics.parquet, states/, failures.parquet and
-    members/; without it all is in memory.
+    With `out` the folder then holds run.json, statistics.parquet, states/, failures.parquet,
+    members/ and, with `pictures`, cloud.png; without it all is in memory.
 
     Raises UsageError, ToolError; EnsembleInterrupted after Ctrl-C, and EnsembleFailed where no
     member reached the end or `time_limit` (s) passed; these carry in `.run` what was computed.  A
@@ -312,6 +313,13 @@ def run_ensemble(
         if folder is not None:
             folder.abandon()
         raise
+    if run.folder is not None and pictures and len(run.t):
+        from hamotor.run.ensemble_pictures import draw_ensemble
+        from hamotor.run.pictures import save
+
+        columns = [column.name for column in description.columns[1:]]
+        sample = gathered.total.sample
+        save(draw_ensemble(run.report, run.statistics, sample, columns), run.folder)
     if run.status == "interrupted":
         raise EnsembleInterrupted(run)
     if run.status == "failed":

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Table = Mapping[str, Array]
 
-_BLUE, _VERMILLION, _GREEN = "#0072B2", "#D55E00", "#009E73"
-_PURPLE, _ORANGE, _SKY, _BLACK = "#CC79A7", "#E69F00", "#56B4E9", "#222222"
-_AXIS_COLOURS = (_VERMILLION, _GREEN, _BLUE, _ORANGE)
-_BODY_COLOURS = (_BLACK, _PURPLE, _ORANGE, _SKY, _GREEN, _BLUE, _VERMILLION)
-_LINE_COLOURS = (_BLUE, _VERMILLION, _GREEN, _PURPLE, _ORANGE, _SKY, _BLACK)
+BLUE, VERMILLION, _GREEN = "#0072B2", "#D55E00", "#009E73"
+_PURPLE, ORANGE, _SKY, _BLACK = "#CC79A7", "#E69F00", "#56B4E9", "#222222"
+AXIS_COLOURS = (VERMILLION, _GREEN, BLUE, ORANGE)
+_BODY_COLOURS = (_BLACK, _PURPLE, ORANGE, _SKY, _GREEN, BLUE, VERMILLION)
+_LINE_COLOURS = (BLUE, VERMILLION, _GREEN, _PURPLE, ORANGE, _SKY, _BLACK)
 _GREY = "#8a8a8a"
 _DARK_GREY = "#555555"
 
@@ -82,7 +82,7 @@ def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
     scaling = [body for body in bodies if f"{body}.scale" in table]
     bending = [body for body in bodies if not _turns(body, report)][:_SPHERES_DRAWN]
     panels = len(turning) + len(bending) + bool(moving) + bool(scaling)
-    figure = _new_figure(5.2 * panels + 1.2, 8.2, layout=None)
+    figure = new_figure(5.2 * panels + 1.2, 8.2, layout=None)
     # Each column shows one thing in space and, below it, over time.
     grid = figure.add_gridspec(
         2,
@@ -95,7 +95,7 @@ def _draw_spatial(report: Mapping[str, Any], table: Table) -> Figure:
         wspace=0.22,
         hspace=0.1,
     )
-    _title(figure, report)
+    title(figure, report)
     column = 0
     if moving:
         space: Any = figure.add_subplot(grid[0, column], projection="3d")
@@ -128,7 +128,7 @@ def _draw_scales(axes: Axes, table: Table, bodies: Sequence[str]) -> None:
     high = max(float(table[f"{body}.scale"].max()) for body in bodies)
     if high > _WIDE_SCALE * low:
         axes.set_yscale("log")
-    _quiet_grid(axes)
+    quiet_grid(axes)
 
 
 def _draw_motor(axes: Axes, body: str, report: Mapping[str, Any], table: Table) -> None:
@@ -145,7 +145,7 @@ def _draw_motor(axes: Axes, body: str, report: Mapping[str, Any], table: Table) 
     axes.set(xlabel="time (s)", ylabel="component")
     axes.set_title(f"motor of {body}", fontsize=10)
     axes.legend(fontsize=8, frameon=False, ncols=2)
-    _quiet_grid(axes)
+    quiet_grid(axes)
 
 
 def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
@@ -167,19 +167,19 @@ def _draw_coordinates(axes: Axes, table: Table, moving: Sequence[str]) -> None:
         fontsize=8,
         frameon=False,
     )
-    _quiet_grid(axes)
+    quiet_grid(axes)
 
 
 def _draw_turning(axes: Axes, t: Array, rotation: Array) -> None:
-    for axis, colour in enumerate(_AXIS_COLOURS[: rotation.shape[-1]]):
+    for axis, colour in enumerate(AXIS_COLOURS[: rotation.shape[-1]]):
         cosine = rotation[:, :, axis] @ rotation[0, :, axis]
         mark = "." if _is_coarse(rotation[:, :, axis]) else "-"
         axes.plot(t, cosine, mark, color=colour, linewidth=1.0, markersize=1.5, alpha=0.85)
     axes.set(xlabel="time (s)", ylabel="cos of the angle turned", ylim=(-1.08, 1.08))
-    _quiet_grid(axes)
+    quiet_grid(axes)
 
 
-def _quiet_grid(axes: Axes) -> None:
+def quiet_grid(axes: Axes) -> None:
     axes.grid(visible=True, color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=8)
@@ -202,7 +202,7 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
         lengths = length * size / size.max()
         tips = lengths[:, None, None] * _in_three(_rotation(body, report, table), 1)
         for row in _evenly(path):
-            for axis, axis_colour in enumerate(_AXIS_COLOURS[: tips.shape[-1]]):
+            for axis, axis_colour in enumerate(AXIS_COLOURS[: tips.shape[-1]]):
                 tip = path[row] + tips[row, :, axis]
                 axes.plot(*np.stack([path[row], tip]).T, color=axis_colour, linewidth=1.2)
     low, high = everything.min(axis=0), everything.max(axis=0)
@@ -225,7 +225,7 @@ def _draw_paths(axes: Any, report: Mapping[str, Any], table: Table, moving: Sequ
     # A tall box would reach beyond its panel.
     axes.set_box_aspect(half / half.max(), zoom=1.05 if half[2] < half.max() else 0.85)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.set_major_locator(_few_ticks())
+        axis.set_major_locator(few_ticks())
     axes.tick_params(labelsize=8)
 
 
@@ -245,7 +245,7 @@ def _draw_sphere(axes: Any, body: str, rotation: Array) -> None:
     if rotation.shape[-1] == 4:
         seen = "in the unit ball, seen along the fourth axis"
     rotation = _in_three(rotation, 1)
-    for axis, colour in enumerate(_AXIS_COLOURS[: rotation.shape[-1]]):
+    for axis, colour in enumerate(AXIS_COLOURS[: rotation.shape[-1]]):
         tips = rotation[:, :, axis]
         if _is_coarse(tips):
             axes.plot(*tips.T, ".", color=colour, markersize=1.2, alpha=0.5)
@@ -284,7 +284,7 @@ def _legend(figure: Figure, bodies: Sequence[str], axes: int = 3) -> None:
     ]
     entries += [
         (Line2D([], [], color=colour, linewidth=2.5), f"body axis {k}")
-        for k, colour in enumerate(_AXIS_COLOURS[:axes], start=1)
+        for k, colour in enumerate(AXIS_COLOURS[:axes], start=1)
     ]
     for marker, label in (("o", "start"), ("s", "end")):
         entries.append((Line2D([], [], color=_BLACK, marker=marker, linestyle="none"), label))
@@ -303,8 +303,8 @@ def _body_colour(number: int) -> str:
 
 
 def _draw_planar(report: Mapping[str, Any], table: Table) -> Figure:
-    figure = _new_figure(11, 5.2)
-    _title(figure, report)
+    figure = new_figure(11, 5.2)
+    title(figure, report)
     place: Axes = figure.add_subplot(1, 2, 1)
     turn: Axes = figure.add_subplot(1, 2, 2)
     bodies = list(report["final"])
@@ -317,7 +317,7 @@ def _draw_planar(report: Mapping[str, Any], table: Table) -> Figure:
         place.plot(*path[0], "o", color=colour, markersize=6)
         place.plot(*path[-1], "s", color=colour, markersize=6)
         for row in _evenly(path):
-            for axis, axis_colour in enumerate(_AXIS_COLOURS[:2]):
+            for axis, axis_colour in enumerate(AXIS_COLOURS[:2]):
                 tip = path[row] + 0.08 * (extent or 1.0) * rotation[row, :, axis]
                 place.plot(*np.stack([path[row], tip]).T, color=axis_colour, linewidth=1.4)
         angle = np.unwrap(np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]))
@@ -330,7 +330,7 @@ def _draw_planar(report: Mapping[str, Any], table: Table) -> Figure:
     place.set_aspect("equal", adjustable="datalim")
     turn.set(xlabel="time (s)", ylabel="angle (rad)", title="attitude")
     for axes in (place, turn):
-        _quiet_grid(axes)
+        quiet_grid(axes)
         axes.title.set_fontsize(10)
     _legend(figure, bodies if len(bodies) > 1 else [], axes=2)
     return figure
@@ -341,8 +341,8 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
 
     A quantity that started at zero has no relative error: its absolute one is drawn dashed.
     """
-    figure = _new_figure(9, 5.8)
-    _title(figure, report, "what must stay constant")
+    figure = new_figure(9, 5.8)
+    title(figure, report, "what must stay constant")
     axes: Axes = figure.add_subplot(1, 1, 1)
     smallest, largest = _EPSILON, _EPSILON
     exact = []
@@ -385,7 +385,7 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
         xlabel="time (s)",
         ylabel="relative error |Q(t) − Q(0)| / |Q(0)|",
     )
-    _quiet_grid(axes)
+    quiet_grid(axes)
     handles = [line for line in axes.lines if not str(line.get_label()).startswith("_")]
     legend = figure.legend(
         handles,
@@ -402,7 +402,7 @@ def draw_conserved(report: Mapping[str, Any], t: Array, swings: Table) -> Figure
     return figure
 
 
-def _new_figure(
+def new_figure(
     width: float, height: float, layout: Literal["constrained"] | None = "constrained"
 ) -> Figure:
     from matplotlib.figure import Figure
@@ -410,7 +410,7 @@ def _new_figure(
     return Figure(figsize=(width, height), layout=layout, facecolor="white")
 
 
-def _title(figure: Figure, report: Mapping[str, Any], what: str = "") -> None:
+def title(figure: Figure, report: Mapping[str, Any], what: str = "") -> None:
     how = (
         f"{report['method']}, step {report['step']:.4g} s, {report['group']} in {report['algebra']}"
     )
@@ -425,7 +425,7 @@ def _halo() -> list[Any]:
     return [withStroke(linewidth=3, foreground="white")]
 
 
-def _few_ticks() -> Any:
+def few_ticks() -> Any:
     from matplotlib.ticker import MaxNLocator
 
     return MaxNLocator(4)
