@@ -44,9 +44,11 @@ namespace detail {
 /// them (Hairer, McLachlan & Razakarivony 2008; Antoñana, Makazaga & Murua 2017), from the last
 /// step's polynomials: to a fixed point while that contracts, else by Newton's method with one
 /// Jacobian for many steps, so that fast spins and stiff springs converge too (up to 48 unknowns a
-/// stage: four bodies in space).  What stopped them is held against what rounding of the stages
-/// does to ξ̇ and ṁ.  Where they settle nowhere else, or not in 20 iterations and one a bit, the
-/// state becomes not a number.
+/// stage: four bodies in space).  Where stages act on each other as that Jacobian does not know
+/// (one moment a millionth of the others, many radii of gyration in a turning step), it takes that
+/// of all stages together (up to 96 unknowns).  What stopped them is held against what rounding of
+/// the stages does to ξ̇ and ṁ.  Where they settle nowhere else, or not in 20 iterations and one a
+/// bit, the state becomes not a number.
 template <HamiltonianSystem System, std::size_t stages>
 class Gauss {
   static_assert(stages >= 1 && stages <= 8);
@@ -61,6 +63,8 @@ class Gauss {
   static constexpr std::size_t positions = n * dimension;
   static constexpr std::size_t unknowns = System::has_forque ? 2 * positions : positions;
   static constexpr bool has_newton = unknowns <= 48;
+  static constexpr bool has_whole = stages * unknowns <= 96;
+  static constexpr int whole_steps = 64;
   static constexpr int most_iterations = 20 + scalar::Limits<S>::digits;
   static inline const auto table = detail::gauss_table<S, stages>();
 
@@ -111,12 +115,21 @@ class Gauss {
   struct NoNewton {
     static constexpr bool on = false;
   };
+  struct NoWhole {};
+  /// The equations of all stages, rows and columns in `units`.
+  struct Whole {
+    Slopes units{};
+    detail::Eliminated<S, stages * unknowns> eliminated{};
+  };
   struct Newton {
     bool on = false;
+    bool whole = false;  ///< whether by the Jacobian of all stages
+    int whole_for = 0;   ///< steps until the smaller ones are tried again
     bool stale = false;  ///< whether the next step is to begin with a new Jacobian
     int iterations = 0;  ///< of the first step that began with this one; 0 before
     S h{};
     detail::StageEquations<S, stages, unknowns> equations{};
+    [[no_unique_address]] std::conditional_t<has_whole, Whole, NoWhole> all{};
   };
 
   /// The first guess where nothing is known: what is at the start.
@@ -267,15 +280,20 @@ class Gauss {
     bool fresh = false;                    // whether Newton's Jacobian is of this step
     [[maybe_unused]] bool begins = false;  // and of its start
     for (iterations_ = 1; iterations_ <= most_iterations; ++iterations_) {
-      Slopes by = residual(system, state, t);
+      const Slopes off = residual(system, state, t);
+      Slopes by = off;
       if constexpr (has_newton) {
         if (newton_.on) {
+          if (iterations_ == 1 && newton_.whole && --newton_.whole_for < 0) {
+            newton_.whole = false;
+            newton_.stale = true;
+          }
           if (iterations_ == 1 && (newton_.stale || newton_.h != h_)) {
             linearise(system, state, t);
             begins = true;
             fresh = true;
           }
-          by = newton_.equations.solve(table, by);
+          by = corrections(off);
         }
       }
       const S change = size(by);
@@ -284,22 +302,31 @@ class Gauss {
       ++since;
       const bool finite = change - change == S(0);
       const bool shrinks = shrunk(by, since == 1);
-      const bool small = change <= S(65536) * scalar::Limits<S>::epsilon();
-      const bool slow = since > 2 && change > S(0.25) * before;
-      // The first two need not show all components.
-      const bool settled =
-          finite && since > 2 && !shrinks && (small || is_rounding(system, state, t, by));
+      // Where a better Jacobian is to be had, less is taken for rounding.
+      const bool best = !has_newton || (fresh && (whole() || !has_whole));
+      const bool small = change <= S(best ? 65536 : 16) * scalar::Limits<S>::epsilon();
+      // The first two need not show all components, but where the Jacobian knows them.
+      const bool known = since > (whole() ? 1 : 2);
+      const bool slow = known && change > S(0.25) * before;
       // A second Jacobian in a step helps only where the first was of another place.
       const bool stuck = slow && (!fresh || change > S(0.75) * before);
+      const bool settled = finite && known && (!shrinks || (fresh && stuck)) &&
+                           (small || is_rounding(system, state, t, off));
       if (!finite || (stuck && !small && !settled)) {
         if constexpr (has_newton) {
-          if (!finite || (!newton_.on && change > S(0.1))) {
-            if (newton_.on && since == 1) return false;
+          const bool further = !newton_.on || (has_whole && fresh && !newton_.whole);
+          if (!finite || (further && change > S(0.1))) {
+            if (!further && since == 1) return false;
             slopes_ = guess;
             beside_ = {};
             place(state);
           }
+          if (further && newton_.on) {
+            newton_.whole = true;
+            newton_.whole_for = whole_steps;
+          }
           newton_.on = true;
+          settle(state);
           linearise(system, state, t);
           newton_.iterations = 0;  // known better at the next step's start
           begins = false;
@@ -313,7 +340,7 @@ class Gauss {
       for (std::size_t s = 0; s < stages; ++s) {
         for (std::size_t k = 0; k < unknowns; ++k) slopes_[s][k] = slopes_[s][k] + by[s][k];
       }
-      place(state);
+      settle(state);
       if (settled) {
         if constexpr (has_newton) {
           if (begins) newton_.iterations = iterations_;
@@ -324,6 +351,86 @@ class Gauss {
       before = change;
     }
     return false;
+  }
+
+  /// Whether Newton's method has the Jacobian of all stages.
+  [[nodiscard]] constexpr bool whole() const noexcept {
+    if constexpr (has_newton) return newton_.whole;
+    return false;
+  }
+
+  /// `place`, with Newton's better Jacobian until momenta no longer wait for each other.
+  constexpr void settle(const StateOf<System>& state) noexcept {
+    place(state);
+    for (int again = 0; whole() && again < 3; ++again) place(state);
+  }
+
+  /// By how much Newton's method changes slopes.
+  [[nodiscard]] constexpr Slopes corrections(const Slopes& residual) const noexcept {
+    if constexpr (has_whole) {
+      if (newton_.whole) {
+        const Slopes& units = newton_.all.units;
+        detail::Vector<S, stages * unknowns> x{};
+        for (std::size_t k = 0; k < x.size(); ++k) {
+          const std::size_t s = k / unknowns;
+          x[k] = residual[s][k % unknowns] / units[s][k % unknowns];
+        }
+        x = newton_.all.eliminated.solve(x);
+        Slopes by{};
+        for (std::size_t k = 0; k < x.size(); ++k) {
+          const std::size_t s = k / unknowns;
+          by[s][k % unknowns] = x[k] * units[s][k % unknowns];
+        }
+        return by;
+      }
+    }
+    return newton_.equations.solve(table, residual);
+  }
+
+  /// The Jacobian of all stages, by differences of the residual.
+  constexpr void linearise_all(const System& system, const StateOf<System>& state,
+                               const S& t) noexcept
+    requires has_whole
+  {
+    constexpr std::size_t size = stages * unknowns;
+    // ε^⅜: where rounding is magnified, ε^½ leaves no digit of a difference.
+    const S fourth = scalar::sqrt(scalar::sqrt(scalar::Limits<S>::epsilon()));
+    const S root = fourth * scalar::sqrt(fourth);
+    Slopes& units = newton_.all.units;
+    for (std::size_t s = 0; s < stages; ++s) {
+      for (std::size_t i = 0; i < n; ++i) {
+        const Rate now = rate(slopes_[s], i);
+        const auto rates = now.components();
+        const S least = S(0.01) * detail::largest(now) +
+                        root * detail::largest(state.motors[i]) / scalar::abs(h_);
+        const S pushed = detail::largest(momenta_[s][i]) + detail::largest(gained_[i]);
+        for (std::size_t k = 0; k < dimension; ++k) {
+          units[s][i * dimension + k] = root * (scalar::abs(rates[k]) + least);
+          if constexpr (System::has_forque) {
+            units[s][positions + i * dimension + k] =
+                select(pushed > S(0), root * pushed / scalar::abs(h_), S(1));
+          }
+        }
+      }
+    }
+    detail::Matrix<S, size> matrix{};
+    Gauss there = *this;
+    const Slopes here = there.residual(system, state, t);
+    for (std::size_t column = 0; column < size; ++column) {
+      const std::size_t from = column / unknowns;
+      there.slopes_ = slopes_;
+      there.beside_ = beside_;
+      S& moved = there.slopes_[from][column % unknowns];
+      moved = moved + units[from][column % unknowns];
+      there.settle(state);
+      const Slopes off = there.residual(system, state, t);
+      for (std::size_t row = 0; row < size; ++row) {
+        const std::size_t s = row / unknowns;
+        const std::size_t k = row % unknowns;
+        matrix[row][column] = (here[s][k] - off[s][k]) / units[s][k];
+      }
+    }
+    newton_.all.eliminated = detail::Eliminated<S, size>(matrix);
   }
 
   /// Whether any component's change is less than half of what it was at its lowest.
@@ -345,9 +452,9 @@ class Gauss {
     return largest;
   }
 
-  /// Whether a change is no more than what rounding of the stages' states makes it.
+  /// Whether a residual is no more than what rounding of the stages' states makes it.
   [[nodiscard]] constexpr bool is_rounding(const System& system, const StateOf<System>& state,
-                                           const S& t, const Slopes& by) noexcept {
+                                           const S& t, const Slopes& residual) noexcept {
     const S epsilon = scalar::Limits<S>::epsilon();
     const auto rounded = [&](auto& x) {
       auto numbers = x.components();
@@ -376,14 +483,11 @@ class Gauss {
       noise[s] = less(slope(system, off, charts, momenta, then).slope,
                       slope(system, center, charts_[s], momenta_[s], then).slope);
     }
-    if constexpr (has_newton) {
-      if (newton_.on) noise = newton_.equations.solve(table, noise);
-    }
     // Where rounding moves the stages by more, they say nothing.
-    if (!(S(64) * size(noise) < S(0.01)) || !(size(by) < S(0.01))) return false;
+    if (!(S(64) * size(noise) < S(0.01)) || !(size(residual) < S(0.01))) return false;
     for (std::size_t k = 0; k < unknowns; ++k) {
-      const S bound = S(64) * largest_of(noise, k) + S(65536) * epsilon * largest_of(slopes_, k);
-      if (!(largest_of(by, k) <= bound)) return false;
+      const S bound = S(64) * largest_of(noise, k) + S(16) * epsilon * largest_of(slopes_, k);
+      if (!(largest_of(residual, k) <= bound)) return false;
     }
     return true;
   }
@@ -419,6 +523,13 @@ class Gauss {
   /// asked.
   constexpr void linearise(const System& system, const StateOf<System>& state,
                            const S& t) noexcept {
+    if constexpr (has_whole) {
+      if (newton_.whole) {
+        newton_.h = h_;
+        linearise_all(system, state, t);
+        return;
+      }
+    }
     const StateOf<System> center = half_way(state);
     const std::array<Chart, n> middle{};
     Momenta momenta{};
