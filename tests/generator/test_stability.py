@@ -102,12 +102,14 @@ def test_what_overflows_stops_and_what_is_denormal_is_refused() -> None:
 
 
 def test_table() -> None:
-    row = {"method": "rk4", "verdict": "fail", "figures": {"error": 0.5}}
+    row = {"method": "rk4", "verdict": "fail", "figures": {"error": 0.5, "float": 0.25}}
+    row |= {"unjudged": {"float": "no digits"}}
     row |= {"failures": ["too far"], "notes": ["judged with a step of 0.1 s"]}
     case = {
         "case": "needle",
         "description": "thin",
         "end": 1.0,
+        "judged_at": 0.5,
         "step": 0.1,
         "condition": 10.0,
         "reference": "a and b",
@@ -116,4 +118,11 @@ def test_table() -> None:
     }
     text = stability.table({"cases": [case], "checks": []})
     assert "    too far\n    judged with a step of 0.1 s\n" in text
-    assert "2 judged: 1 pass, 0 unresolved" in text
+    assert "2 rows: 1 pass, 0 unresolved" in text
+    assert "judged at 0.5 s" in text
+    assert "(2.5e-01)" in text
+    assert "float not judged, no digits: rk4, rk4" in text
+    row["figures"] = {"error": 0.5, "reversal": float("inf")}
+    text = stability.table({"cases": [case], "checks": []})
+    assert "inf" not in text
+    assert text.count("–") >= 2
