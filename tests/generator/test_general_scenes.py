@@ -480,7 +480,7 @@ step = 0.001
 """
     weight = wide([0, 0, -4.5])
     _, rotation = drawn.at_the_end(lambda _, r: (0 * weight, np.cross(wide(place), r.T @ weight)))
-    run = load(text, tmp_path).run(step=1 / 4000)
+    run = load(text, tmp_path).run(step=1 / 4000, method="splitting6")
     assert np.abs(run.rotation()[-1] - rotation).max() <= 1e-10
 
 
@@ -519,7 +519,7 @@ step = 0.001
         [np.eye(4, dtype=np.longdouble).ravel(), (spread @ omega + omega @ spread).ravel()]
     )
     rotation = extrapolated(field, start, 2.0, 40)[:16].reshape(4, 4)
-    run = load(text, tmp_path).run(step=1 / 2000)
+    run = load(text, tmp_path).run(step=1 / 2000, method="splitting6")
     assert np.abs(run.rotation()[-1] - rotation).max() <= 1e-10
     assert np.abs(run.position()[-1] - 2 * wide(list(speeds.values()))).max() <= 1e-10
 
@@ -620,7 +620,7 @@ step = 0.001
         return np.concatenate([(matrix @ rate).ravel(), np.einsum("jik,j,k", structure, rates, mu)])
 
     y = extrapolated(field, np.concatenate([np.eye(5).ravel(), wide(momentum)]), 2.0, 40)
-    run = load(text, tmp_path).run(step=1 / 2000)
+    run = load(text, tmp_path).run(step=1 / 2000, method="splitting6")
     assert np.abs(run.momentum()[-1] - y[25:]).max() <= 1e-10
     origin = y[:25].reshape(5, 5)[:, 0]
     assert np.abs(run.position()[-1] - origin[1:4] / origin[0]).max() <= 1e-10

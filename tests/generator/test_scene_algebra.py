@@ -203,7 +203,7 @@ def test_a_scene_lives_on_a_group_of_its_own(tmp_path: Path) -> None:
         "parameters = { k = 8 }\n[time]\nend = 1\nstep = 0.001\n",
         encoding="utf-8",
     )
-    run = hamotor.load(scene).run()
+    run = hamotor.load(scene).run(method="splitting6")
     last = run.report["final"]["shaft"]
     assert last["position"] == pytest.approx([0, 0, math.cos(2)], abs=1e-11)
     assert last["rotation"][0] == pytest.approx([math.cos(3), -math.sin(3), 0], abs=1e-11)
