@@ -59,6 +59,7 @@ def test_an_ensemble_prints_its_summary_and_writes_into_runs(
         "statistics.parquet",
         "states",
         "members",
+        "cloud.png",
     }
     assert main(["run", "some", "--ensemble", "20", "--member", "3", "--json", "--out", "one"]) == 0
     assert json.loads(capsys.readouterr().out)["ensemble"]["first"] == 3
