@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
 from hamotor.bench import bench_stability, stability
 from hamotor.errors import UsageError
-from hamotor.run.simulation import load
+from hamotor.run.library import Vector
+from hamotor.run.result import Run, RunFailed
+from hamotor.run.simulation import Simulation, load
 from hamotor.scene import METHODS, Promise
 from hamotor.scene.methods import ALL
 
@@ -87,6 +92,86 @@ def test_a_wrong_order_fails(needle: stability.Case, reference: stability.Refere
     row = stability.judged("needle", needle, elsewhere, "splitting2")
     assert row.verdict == "fail"
     assert any("falls to" in failure for failure in row.failures)
+
+
+def stop_above(longest: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lets runs with longer steps stop."""
+    run = stability._run
+
+    def stopping(simulation: Simulation, *args: Any, **options: Any) -> Run:
+        assert simulation.step is not None
+        if simulation.step > longest:
+            raise RunFailed("stopped", Run({}))
+        return run(simulation, *args, **options)
+
+    monkeypatch.setattr(stability, "_run", stopping)
+
+
+def test_what_stops_is_tried_with_a_far_shorter_step(
+    needle: stability.Case, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert needle.step is not None
+    far = needle.step / stability.FAR_SHORTER
+    with monkeypatch.context() as patch:
+        stop_above(1.5 * far, patch)
+        row = stability.judged("needle", needle, reference, "splitting2")
+    assert row.verdict == "pass", row.failures
+    assert row.step == far
+    assert [note.split(":")[0] for note in row.notes] == [
+        "step",
+        "step of 0.005 s",
+        "step of 0.00125 s",
+        f"judged with a step of {far:g} s",
+    ]
+    stop_above(0.0, monkeypatch)
+    row = stability.judged("needle", needle, reference, "splitting2")
+    assert row.verdict == "fail"
+    assert row.failures == ["stops with every step"]
+
+
+def test_what_is_judged_early_is_carried_on(
+    needle: stability.Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    promising = tuple(replace(m, promises=Promise.MOMENTA) for m in METHODS)
+    monkeypatch.setattr(stability, "METHODS", promising)
+
+    def carried_on(method: str, step: float) -> stability.Row:
+        row = stability.Row("needle", method, 2, {}, "pass", step=step)
+        return stability.carried_on(row, needle)
+
+    row = carried_on("splitting2", 0.02)
+    assert row.verdict == "pass", row.failures
+    row = carried_on("rk4", 0.1)
+    assert row.verdict == "fail"
+    assert row.failures[0].startswith("momenta change by")
+    stop_above(0.0, monkeypatch)
+    row = carried_on("splitting2", 0.02)
+    assert row.verdict == "fail"
+    assert row.failures == [f"does not go on to {needle.end:g} s: stopped"]
+
+
+def test_energy_errors_may_grow_with_the_square_of_momenta(
+    needle: stability.Case, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def grows(momenta: Vector, errors: Vector) -> bool:
+        run = SimpleNamespace(
+            energy=1 + errors,
+            conserved={"energy": {"scale": 1.0}},
+            bodies=("body",),
+            momentum=lambda _: momenta[:, None],
+            report={"steps": 400},
+            final={},
+        )
+        monkeypatch.setattr(stability, "_run", lambda *_, **__: run)
+        monkeypatch.setattr(stability, "_energy_moved", lambda *_: 0.0)
+        early, late, grown, _ = stability._energy_errors(needle, "splitting2")
+        return late > stability.GROWTH * early * grown
+
+    falling = np.linspace(1, 10, 400)
+    assert not grows(falling, 1e-3 * (falling**2 - 1))
+    assert grows(falling, 1e-3 * (falling**4 - 1))
+    assert grows(np.ones(400), 1e-3 * (falling**2 - 1))
+    assert grows(falling[::-1], 1e-3 * (falling**2 - 1))
 
 
 def test_exp_and_log_at_their_edges() -> None:

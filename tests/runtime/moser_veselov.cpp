@@ -140,8 +140,16 @@ TEST(MoserVeselov, keeps_the_digits_of_a_needles_spin) {
   System::State start{};
   start.motors[0].s = 1;
   start.momenta[0] = {1, 0.5, 2e-8};
-  const auto there = stepped<MoserVeselov<System, 2>>(system, start, 0.02, 1000);
-  EXPECT_LT(distance(stepped<MoserVeselov<System, 2>>(system, there, -0.02, 1000), start), 1e-13);
+  const auto exact = stepped<hamotor::ClosedForm<System>>(system, start, 20, 1);
+  const auto check = [&](auto order, double bound) {
+    using Method = MoserVeselov<System, order.value>;
+    const auto there = stepped<Method>(system, start, 0.02, 1000);
+    EXPECT_LT(distance(there, exact), bound) << order.value;
+    EXPECT_LT(distance(stepped<Method>(system, there, -0.02, 1000), start), 1e-13) << order.value;
+  };
+  check(std::integral_constant<int, 2>{}, 0.05);
+  check(std::integral_constant<int, 6>{}, 1e-8);
+  check(std::integral_constant<int, 10>{}, 1e-8);
 }
 
 TEST(MoserVeselov, starts_anew_where_the_state_was_changed) {

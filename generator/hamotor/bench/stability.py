@@ -13,9 +13,10 @@ nobody is asked for digits that the state does not hold:
 * a run in `float` is as good as its digits (one method of each family).
 
 Where h is too long for a method (it stops, its error is beyond 0.1 or does not yet fall as the
-order says) it is judged at h/4 or h/16, and the row says so.  It stays `unresolved` where that is
-too long as well, or where rounding × condition leaves no digit in a double: all that is asked then
-is that numbers stay finite and that what is promised for every step holds.  A case whose end holds
+order says) it is judged at h/4 or h/16, at h/256 where it stops with h/16, and the row says so.  It
+stays `unresolved` where that is too long as well, or where rounding × condition leaves no digit in
+a double: all that is asked then is that numbers stay finite and that what is promised for every
+step holds.  A method that stops with all these steps fails.  A case whose end holds
 few digits is judged at a half, a quarter or an eighth of its time, and goes on to its end.
 
 Beside them: exp and log of every group around multiples of π, runs that must stop cleanly, and a
@@ -64,7 +65,7 @@ ROWS: Final = 1000
 SHORTER: Final = (1, 4, 16)
 """Parts of the case's step that a method is tried with, until it resolves the case."""
 FAR_SHORTER: Final = 256
-"""Part that a method must resolve the case with where it stops with all of these."""
+"""Part that a method is judged with where it stops with the last of these."""
 FEW_DIGITS: Final = 1e-3
 """What rounding may leave at the time at which a case is judged."""
 PERTURBATION: Final = 1e-15
@@ -377,23 +378,28 @@ def end_state(run: Run) -> Vector:
 
 
 def judged(case: str, simulation: Simulation, reference: Reference, method: str) -> Row:
-    """One method on one case, with the first of the steps h, h/4 and h/16 that resolves it."""
+    """One method on one case, with the first of the steps h, h/4 and h/16 that resolves it.
+
+    With h/256 where it stops with h/16.
+    """
     traits = next(m for m in METHODS if m.name == method)
     notes: list[str] = []
-    for shorter in SHORTER:
+    for shorter in (*SHORTER, FAR_SHORTER):
         assert simulation.step is not None
         finer = replace(simulation, step=simulation.step / shorter)
         of_step = f" of {finer.step:g} s" if shorter > 1 else ""
         steps = round(simulation.end / simulation.step) * shorter
         floor = _floor(reference, steps, "double")
+        last = shorter >= SHORTER[-1]
         try:
             coarse = _run(finer, method, 1, watched=True)
             fine = _run(finer, method, 2)
         except RunFailed as failed:
             notes.append(f"step{of_step}: {failed}")
+            if last and floor > UNRESOLVED:
+                return Row(case, method, traits.order, {"rounding": floor}, "stops", [], notes)
             continue
         error = distance(end_state(coarse), reference.end, simulation)
-        last = shorter == SHORTER[-1]
         resolved = error <= UNRESOLVED or traits.order == 0 or not math.isfinite(error)
         half = distance(end_state(fine), reference.end, simulation)
         if last or (resolved and half <= _allowed(traits, error, floor)) or floor > UNRESOLVED:
@@ -405,20 +411,8 @@ def judged(case: str, simulation: Simulation, reference: Reference, method: str)
                 notes.append(f"judged with a step of {finer.step:g} s")
             return _judged_at(case, finer, reference, traits, (coarse, fine), notes)
         notes.append(f"step{of_step} too long: error {error:.1e}, with half of it {half:.1e}")
-    verdict, failures = "stops" if floor > UNRESOLVED else "unresolved", []
-    if verdict == "unresolved":
-        assert simulation.step is not None
-        far = replace(simulation, step=simulation.step / FAR_SHORTER)
-        try:
-            left = distance(end_state(_run(far, method, 1)), reference.end, simulation)
-        except RunFailed as failed:
-            left, stop = math.inf, str(failed)
-            notes.append(f"step of {far.step:g} s: {stop}")
-        if left <= UNRESOLVED:
-            notes.append(f"step too long even at {finer.step:g} s; {left:.1e} with {far.step:g} s")
-        else:
-            verdict, failures = "fail", ["stops with every step"]
-    return Row(case, method, traits.order, {"rounding": floor}, verdict, failures, notes)
+    failures = ["stops with every step"]
+    return Row(case, method, traits.order, {"rounding": floor}, "fail", failures, notes)
 
 
 def carried_on(row: Row, whole: Simulation) -> Row:

@@ -22,116 +22,165 @@ namespace hamotor {
 
 namespace detail::moser_veselov {
 
-/// A term `over`/`under` Hⁱ C^(k−i) e₁ˡ e₂ᵐ e₃ⁿ of a series' coefficient of h^2k.
+/// A term `over`/`under` Gⁱ C^(k−i) aˡ sᵐ pⁿ of a series' coefficient of h^2k.
 struct Term {
-  std::size_t energy;                    ///< i
-  std::array<std::size_t, 3> symmetric;  ///< l, m, n
+  std::size_t energy;               ///< i
+  std::array<std::size_t, 3> rest;  ///< l, m, n
   int over;
   int under;
 };
 
-// The modified moments are 1/J̃_j = (1 + Σ scale_k h^k)/J_j + Σ shift_k h^k.  These are exact, from
-// the Taylor series of rational motions: a rotor's e = v/w is a step of the algorithm with moments
-// that follow from it linearly.  H is the kinetic energy, C = ½ |Π|², and e₁, e₂, e₃ the elementary
-// symmetric functions of 1/J_j.
-inline constexpr std::array<Term, 2> scale2{{{0, {0, 1, 0}, 1, 6}, {1, {1, 0, 0}, -1, 3}}};
-inline constexpr std::array<Term, 6> scale4{{{0, {0, 2, 0}, 1, 30},
-                                             {0, {1, 0, 1}, -1, 10},
-                                             {1, {0, 0, 1}, 2, 15},
-                                             {1, {1, 1, 0}, -1, 30},
-                                             {2, {0, 1, 0}, -1, 60},
-                                             {2, {2, 0, 0}, 1, 30}}};
-inline constexpr std::array<Term, 12> scale6{{{0, {0, 0, 2}, 5, 126},
-                                              {0, {0, 3, 0}, 17, 2520},
-                                              {0, {1, 1, 1}, -11, 420},
-                                              {1, {0, 1, 1}, -1, 84},
-                                              {1, {1, 2, 0}, -1, 70},
-                                              {1, {2, 0, 1}, 11, 210},
-                                              {2, {0, 2, 0}, 41, 2520},
-                                              {2, {1, 0, 1}, -53, 630},
-                                              {2, {2, 1, 0}, 1, 420},
-                                              {3, {0, 0, 1}, 1, 35},
-                                              {3, {1, 1, 0}, 1, 630},
-                                              {3, {3, 0, 0}, -1, 630}}};
-inline constexpr std::array<Term, 21> scale8{
-    {{0, {0, 1, 2}, 97, 15120}, {0, {0, 4, 0}, 31, 22680}, {0, {1, 2, 1}, -19, 2520},
-     {0, {2, 0, 2}, 1, 120},    {1, {0, 2, 1}, 47, 7560},  {1, {1, 0, 2}, -47, 945},
-     {1, {1, 3, 0}, -11, 3240}, {1, {2, 1, 1}, 17, 1260},  {2, {0, 0, 2}, 53, 1260},
-     {2, {0, 3, 0}, 1, 2520},   {2, {1, 1, 1}, 1, 252},    {2, {2, 2, 0}, 13, 3780},
-     {2, {3, 0, 1}, -17, 1260}, {3, {0, 1, 1}, -23, 1260}, {3, {1, 2, 0}, -11, 1890},
-     {3, {2, 0, 1}, 23, 945},   {3, {3, 1, 0}, -1, 11340}, {4, {0, 2, 0}, 17, 5040},
-     {4, {1, 0, 1}, -3, 280},   {4, {2, 1, 0}, -1, 15120}, {4, {4, 0, 0}, 1, 22680}}};
-inline constexpr std::array<Term, 2> shift2{{{0, {0, 0, 1}, -1, 3}, {1, {0, 1, 0}, 1, 6}}};
-inline constexpr std::array<Term, 5> shift4{{{0, {0, 1, 1}, -1, 60},
-                                             {1, {0, 2, 0}, -1, 60},
-                                             {1, {1, 0, 1}, 2, 15},
-                                             {2, {0, 0, 1}, -1, 10},
-                                             {2, {1, 1, 0}, -1, 60}}};
-inline constexpr std::array<Term, 11> shift6{{{0, {0, 2, 1}, -19, 2520},
-                                              {0, {1, 0, 2}, 1, 35},
-                                              {1, {0, 0, 2}, -22, 315},
-                                              {1, {0, 3, 0}, 1, 1260},
-                                              {1, {1, 1, 1}, -1, 1260},
-                                              {2, {0, 1, 1}, 11, 252},
-                                              {2, {1, 2, 0}, 13, 2520},
-                                              {2, {2, 0, 1}, -8, 315},
-                                              {3, {0, 2, 0}, -13, 1260},
-                                              {3, {1, 0, 1}, 1, 42},
-                                              {3, {2, 1, 0}, 1, 1260}}};
-inline constexpr std::array<Term, 20> shift8{
-    {{0, {0, 0, 3}, -61, 4536}, {0, {0, 3, 1}, -61, 45360}, {0, {1, 1, 2}, 3, 560},
-     {1, {0, 1, 2}, 19, 1260},  {1, {0, 4, 0}, -1, 45360},  {1, {1, 2, 1}, 37, 7560},
-     {1, {2, 0, 2}, -2, 105},   {2, {0, 2, 1}, -19, 1080},  {2, {1, 0, 2}, 89, 1890},
-     {2, {1, 3, 0}, -1, 1512},  {2, {2, 1, 1}, 19, 7560},   {3, {0, 0, 2}, -1, 35},
-     {3, {0, 3, 0}, 97, 22680}, {3, {1, 1, 1}, -23, 1890},  {3, {2, 2, 0}, -1, 1512},
-     {3, {3, 0, 1}, 8, 2835},   {4, {0, 1, 1}, 17, 1680},   {4, {1, 2, 0}, -1, 7560},
-     {4, {2, 0, 1}, -1, 360},   {4, {3, 1, 0}, -1, 45360}}};
+// With a = 1/J_m of the middle moment and d_j = 1/J_j − a of the others, the modified moments are
+// 1/J̃_m = a + Σ shift_k h^k and 1/J̃_j = 1/J̃_m + (1 + Σ scale_k h^k) d_j.  These are exact, from the
+// Taylor series of rational motions: a rotor's e = v/w is a step of the algorithm with moments that
+// follow from it linearly.  C = ½ |Π|², G is the kinetic energy less a C, s and p are the sum and
+// the product of the d_j.  In H and 1/J_j themselves there are fewer terms, which cancel where
+// bodies are thin: by all digits of a double where one moment is 1e-8 of the others.
+inline constexpr std::array<Term, 4> scale2{
+    {{0, {0, 0, 1}, 1, 6}, {0, {2, 0, 0}, -1, 2}, {1, {0, 1, 0}, -1, 3}, {1, {1, 0, 0}, -1, 1}}};
+inline constexpr std::array<Term, 10> scale4{{{0, {0, 0, 2}, 1, 30},
+                                              {0, {2, 0, 1}, -1, 12},
+                                              {0, {4, 0, 0}, 1, 12},
+                                              {1, {0, 1, 1}, -1, 30},
+                                              {1, {2, 1, 0}, 1, 6},
+                                              {1, {3, 0, 0}, 1, 3},
+                                              {2, {0, 0, 1}, -1, 60},
+                                              {2, {0, 2, 0}, 1, 30},
+                                              {2, {1, 1, 0}, 1, 6},
+                                              {2, {2, 0, 0}, 1, 4}}};
+inline constexpr std::array<Term, 19> scale6{{{0, {0, 0, 3}, 17, 2520},
+                                              {0, {2, 0, 2}, -1, 60},
+                                              {0, {4, 0, 1}, 1, 72},
+                                              {0, {6, 0, 0}, -1, 180},
+                                              {1, {0, 1, 2}, -1, 70},
+                                              {1, {1, 0, 2}, -1, 45},
+                                              {1, {2, 1, 1}, 1, 60},
+                                              {1, {4, 1, 0}, -1, 36},
+                                              {1, {5, 0, 0}, -1, 30},
+                                              {2, {0, 0, 2}, 41, 2520},
+                                              {2, {0, 2, 1}, 1, 420},
+                                              {2, {2, 0, 1}, -1, 30},
+                                              {2, {2, 2, 0}, -1, 60},
+                                              {2, {3, 1, 0}, -1, 18},
+                                              {2, {4, 0, 0}, -1, 24},
+                                              {3, {0, 1, 1}, 1, 630},
+                                              {3, {0, 3, 0}, -1, 630},
+                                              {3, {1, 0, 1}, 1, 30},
+                                              {3, {1, 2, 0}, -1, 90}}};
+inline constexpr std::array<Term, 35> scale8{
+    {{0, {0, 0, 4}, 31, 22680}, {0, {2, 0, 3}, -17, 5040}, {0, {4, 0, 2}, 1, 360},
+     {0, {6, 0, 1}, -1, 1080},  {0, {8, 0, 0}, 1, 5040},   {1, {0, 1, 3}, -11, 3240},
+     {1, {1, 0, 3}, -1, 315},   {1, {2, 1, 2}, 1, 140},    {1, {3, 0, 2}, 1, 135},
+     {1, {4, 1, 1}, -1, 360},   {1, {6, 1, 0}, 1, 540},    {1, {7, 0, 0}, 1, 630},
+     {2, {0, 0, 3}, 1, 2520},   {2, {0, 2, 2}, 13, 3780},  {2, {1, 1, 2}, 1, 105},
+     {2, {2, 0, 2}, 1, 630},    {2, {2, 2, 1}, -1, 840},   {2, {4, 0, 1}, 1, 180},
+     {2, {4, 2, 0}, 1, 360},    {2, {5, 1, 0}, 1, 180},    {2, {6, 0, 0}, 1, 360},
+     {3, {0, 1, 2}, -11, 1890}, {3, {0, 3, 1}, -1, 11340}, {3, {1, 0, 2}, -1, 45},
+     {3, {2, 1, 1}, -2, 315},   {3, {2, 3, 0}, 1, 1260},   {3, {3, 0, 1}, -1, 90},
+     {3, {3, 2, 0}, 1, 270},    {4, {0, 0, 2}, 17, 5040},  {4, {0, 2, 1}, -1, 15120},
+     {4, {0, 4, 0}, 1, 22680},  {4, {1, 1, 1}, 1, 420},    {4, {1, 3, 0}, 1, 2520},
+     {4, {2, 0, 1}, -1, 80},    {4, {2, 2, 0}, 1, 240}}};
+inline constexpr std::array<Term, 3> shift2{
+    {{0, {3, 0, 0}, -1, 3}, {1, {0, 0, 1}, 1, 6}, {1, {2, 0, 0}, -1, 2}}};
+inline constexpr std::array<Term, 6> shift4{{{0, {5, 0, 0}, 1, 30},
+                                             {1, {0, 0, 2}, -1, 60},
+                                             {1, {4, 0, 0}, 1, 12},
+                                             {2, {0, 1, 1}, -1, 60},
+                                             {2, {1, 0, 1}, -1, 6},
+                                             {2, {2, 1, 0}, -1, 12}}};
+inline constexpr std::array<Term, 13> shift6{{{0, {7, 0, 0}, -1, 630},
+                                              {1, {0, 0, 3}, 1, 1260},
+                                              {1, {6, 0, 0}, -1, 180},
+                                              {2, {0, 1, 2}, 13, 2520},
+                                              {2, {1, 0, 2}, 2, 45},
+                                              {2, {2, 1, 1}, 1, 30},
+                                              {2, {3, 0, 1}, 1, 18},
+                                              {2, {4, 1, 0}, 1, 72},
+                                              {3, {0, 0, 2}, -13, 1260},
+                                              {3, {0, 2, 1}, 1, 1260},
+                                              {3, {1, 1, 1}, -1, 90},
+                                              {3, {2, 0, 1}, 1, 20},
+                                              {3, {2, 2, 0}, -1, 60}}};
+inline constexpr std::array<Term, 24> shift8{
+    {{0, {9, 0, 0}, 1, 22680}, {1, {0, 0, 4}, -1, 45360}, {1, {8, 0, 0}, 1, 5040},
+     {2, {0, 1, 3}, -1, 1512}, {2, {1, 0, 3}, -2, 315},   {2, {2, 1, 2}, -2, 315},
+     {2, {3, 0, 2}, -2, 135},  {2, {4, 1, 1}, -1, 180},   {2, {5, 0, 1}, -1, 180},
+     {2, {6, 1, 0}, -1, 1080}, {3, {0, 0, 3}, 97, 22680}, {3, {0, 2, 2}, -1, 1512},
+     {3, {1, 1, 2}, 1, 315},   {3, {2, 0, 2}, -1, 63},    {3, {2, 2, 1}, 2, 315},
+     {3, {3, 1, 1}, 1, 270},   {3, {4, 0, 1}, -1, 120},   {3, {4, 2, 0}, 1, 360},
+     {4, {0, 1, 2}, -1, 7560}, {4, {0, 3, 1}, -1, 45360}, {4, {1, 0, 2}, 11, 840},
+     {4, {1, 2, 1}, -1, 280},  {4, {2, 1, 1}, 11, 840},   {4, {2, 3, 0}, -17, 5040}}};
 
-/// Σ of the terms, of degree k in H and C.
+/// Σ of the terms, of degree k in G and C.
 template <class S, std::size_t terms>
 [[nodiscard]] constexpr S sum(const std::array<Term, terms>& series, std::size_t k, const S& energy,
-                              const S& casimir, const std::array<S, 3>& symmetric) noexcept {
+                              const S& casimir, const std::array<S, 3>& rest) noexcept {
   S result(0);
   for (const Term& term : series) {
     S value =
         S(term.over) / S(term.under) * power(energy, term.energy) * power(casimir, k - term.energy);
-    for (std::size_t j = 0; j < 3; ++j) value = value * power(symmetric[j], term.symmetric[j]);
+    for (std::size_t j = 0; j < 3; ++j) value = value * power(rest[j], term.rest[j]);
     result = result + value;
   }
   return result;
 }
 
+/// Moments of inertia, kg m², with their differences, whose digits they lack where they are alike.
+template <class S>
+struct Moments {
+  std::array<S, 3> values;
+  std::array<S, 3> differences;  ///< J₃ − J₂, J₁ − J₃, J₂ − J₁
+};
+
+/// The number of the moment that is neither the largest nor the smallest.
+template <class S>
+[[nodiscard]] constexpr std::size_t middle_of(const std::array<S, 3>& moments) noexcept {
+  const auto& [one, two, three] = moments;
+  if ((two <= one) == (one <= three)) return 0;
+  return (three <= two) == (two <= one) ? 1 : 2;
+}
+
 /// The moments with which a step of h is of the given order, for a body of these moments (kg m²)
 /// that turns freely with angular momentum `angular` (kg m²/s, principal frame).
 template <int order, class S>
-[[nodiscard]] constexpr std::array<S, 3> modified_moments(const std::array<S, 3>& moments,
-                                                          const std::array<S, 3>& angular,
-                                                          const S& h) noexcept {
+[[nodiscard]] constexpr Moments<S> modified_moments(const std::array<S, 3>& moments,
+                                                    const std::array<S, 3>& angular,
+                                                    const S& h) noexcept {
   static_assert(order == 2 || order == 4 || order == 6 || order == 8 || order == 10);
   const S unit = scalar::max_abs(moments[0], moments[1], moments[2]);
-  std::array<S, 3> a{};
+  const S middle = moments[middle_of(moments)];
+  const S a = unit / middle;
+  std::array<S, 3> d{};
+  S sum_of_d(0);
   S energy(0);
   S casimir(0);
   for (std::size_t j = 0; j < 3; ++j) {
-    a[j] = unit / moments[j];
+    d[j] = (unit / moments[j]) * ((middle - moments[j]) / middle);
     const S x = angular[j] * (h / unit);
+    sum_of_d = sum_of_d + d[j];
     casimir = casimir + S(0.5) * x * x;
-    energy = energy + S(0.5) * a[j] * x * x;
+    energy = energy + S(0.5) * d[j] * x * x;
   }
-  const std::array<S, 3> e{a[0] + a[1] + a[2], a[0] * a[1] + a[1] * a[2] + a[2] * a[0],
-                           a[0] * a[1] * a[2]};
+  // One of the three d_j is 0.
+  const std::array<S, 3> rest{a, sum_of_d, d[0] * d[1] + d[1] * d[2] + d[2] * d[0]};
   S scale(0);
   S shift(0);
   const auto add = [&](std::size_t k, const auto& scales, const auto& shifts) {
-    scale = scale + sum(scales, k, energy, casimir, e);
-    shift = shift + sum(shifts, k, energy, casimir, e);
+    scale = scale + sum(scales, k, energy, casimir, rest);
+    shift = shift + sum(shifts, k, energy, casimir, rest);
   };
   if constexpr (order >= 10) add(4, scale8, shift8);
   if constexpr (order >= 8) add(3, scale6, shift6);
   if constexpr (order >= 6) add(2, scale4, shift4);
   if constexpr (order >= 4) add(1, scale2, shift2);
-  std::array<S, 3> result{};
-  for (std::size_t j = 0; j < 3; ++j) result[j] = unit / (a[j] + (a[j] * scale + shift));
+  scale = S(1) + scale;
+  Moments<S> result{};
+  for (std::size_t j = 0; j < 3; ++j) result.values[j] = unit / (a + shift + scale * d[j]);
+  for (std::size_t j = 0; j < 3; ++j) {
+    const std::size_t k = (j + 1) % 3;
+    const std::size_t l = (j + 2) % 3;
+    result.differences[j] = result.values[k] * (result.values[l] / unit) * (scale * (d[k] - d[l]));
+  }
   return result;
 }
 
@@ -140,10 +189,11 @@ template <class S>
 class Rotation {
  public:
   /// With these moments, modified or not.
-  constexpr void set_moments(const std::array<S, 3>& moments) noexcept {
-    moments_ = moments;
+  template <class Wide>
+  constexpr void set_moments(const Moments<Wide>& moments) noexcept {
     for (std::size_t j = 0; j < 3; ++j) {
-      differences_[j] = moments[(j + 2) % 3] - moments[(j + 1) % 3];
+      moments_[j] = static_cast<S>(moments.values[j]);
+      differences_[j] = static_cast<S>(moments.differences[j]);
     }
   }
 
@@ -376,10 +426,8 @@ class MoserVeselov {
           moments[j] = Wide(body.moments()[j]);
           momentum[j] = Wide(angular[j]);
         }
-        const auto modified =
-            detail::moser_veselov::modified_moments<order>(moments, momentum, Wide(h));
-        rotations_[i].set_moments({static_cast<S>(modified[0]), static_cast<S>(modified[1]),
-                                   static_cast<S>(modified[2])});
+        rotations_[i].set_moments(
+            detail::moser_veselov::modified_moments<order>(moments, momentum, Wide(h)));
       });
     }
   }
