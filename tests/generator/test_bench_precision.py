@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +15,15 @@ import numpy as np
 import pytest
 from tests.bench.precision import peers, stopwatch
 
-from hamotor.bench import endpoint, solvers
+from hamotor.bench import endpoint, precision, solvers
 from hamotor.bench.contest import Extent
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
-from hamotor.bench.precision_report import best, table, write_report
+from hamotor.bench.precision_report import best, over_problems, table
 from hamotor.bench.problems import REFERENCES, Problem, Reference, own_problems, problem
 from hamotor.bench.summary import summary
+from hamotor.errors import UsageError
 
 
 @pytest.mark.parametrize("name", own_problems())
@@ -100,7 +103,9 @@ def test_a_reference_in_two_precisions_has_25_digits() -> None:
 
 
 @pytest.mark.slow
-def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path: Path) -> None:
+def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     simulation = replace(problem("planar").simulation, methods={"splitting8": 8})
     one = Problem("planar", simulation)
     library = simulation.compile(method="splitting8").library
@@ -111,7 +116,7 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
     extent = Extent(
         2, 2.0, 0.001, 0.01, forms=False, compilers=("g++",), drift=20_000, counted=True
     )
-    account = measure([one], extent, {}, {})
+    account = measure([one], extent, {}, {}, tmp_path)
     assert "space" in account["not_there"]["public solvers on planar"]
     for method in simulation.methods:
         rows = [r for r in account["rows"] if r["contestant"] == method]
@@ -131,13 +136,69 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(tmp_path:
     assert energy["steps"] == 20_000
     assert 0 < energy["largest"] < 1e-10
     assert "long runs" in table(account)
-    json_file, page_file, *_ = write_report(account, tmp_path)
-    page = page_file.read_text(encoding="utf-8")
+    page = (tmp_path / "precision.html").read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=|https?://(?!www\.w3\.org/2000/svg)", page)
     embedded = re.search(r'type="application/json">(.*?)</script>', page, re.DOTALL)
     assert embedded is not None
-    assert json.loads(embedded[1]) == json.loads(json_file.read_text(encoding="utf-8"))
+    written = json.loads((tmp_path / "precision.json").read_text(encoding="utf-8"))
+    assert json.loads(embedded[1]) == written
     assert (tmp_path / "precision_planar.svg").is_file()
+
+    def never(*_: Any) -> None:
+        pytest.fail("measured again")
+
+    # Cut after a problem, the same call goes on; the next problem's failure is a gap.
+    monkeypatch.setattr(precision, "_measured", never)
+    assert measure([one], extent, {}, {}, tmp_path)["rows"] == written["rows"]
+    monkeypatch.setattr(precision, "_measured", _refused)
+    both = measure([one, Problem("other", simulation)], extent, {}, {}, tmp_path)
+    assert list(both["problems"]) == ["planar"]
+    assert both["not_there"]["other"] == "no reference"
+    with pytest.raises(UsageError, match="no reference"):
+        measure([one], replace(extent, rounds=3), {}, {}, tmp_path)
+
+
+def _refused(*_: Any) -> None:
+    raise UsageError("no reference")
+
+
+def test_a_solver_that_hangs_or_crashes_is_a_row_and_the_rest_goes_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    script = """
+import json, os, sys, time
+skipped = dict(json.load(open(sys.argv[1]))["skipped"])
+for index in range(3):
+    for setting in range(skipped.get(index, 2)):
+        at = {"index": index, "setting": setting}
+        print(json.dumps(at), flush=True)
+        if (index, setting) == (0, 1):
+            time.sleep(60)
+        if (index, setting) == (1, 0):
+            os.abort()
+        print(json.dumps({**at, "final": [1.0]}), flush=True)
+"""
+
+    def stopwatch(file: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            (sys.executable, "-c", script, file), stdout=subprocess.PIPE, text=True
+        )
+
+    monkeypatch.setattr(solvers, "stopwatch", stopwatch)
+    answers = solvers.timed({}, silent_s=1.0)
+    assert answers.keys() == {(0, 0), (0, 1), (1, 0), (2, 0), (2, 1)}
+    assert "timed out" in answers[0, 1]["failure"]
+    assert answers[1, 0]["failure"].endswith("ended with -6")
+    assert all("final" in answers[at] for at in ((0, 0), (2, 0), (2, 1)))
+
+
+def test_over_problems_the_worst_is_named() -> None:
+    rows = [
+        {"problem": name, "target": 1e-4, "ours": {}, "peer": {}, "ratio": ratio}
+        for name, ratio in (("a", 3.0), ("b", 0.5), ("c", 2.0))
+    ]
+    (found,) = over_problems(rows)
+    assert (found["median"], found["worst"], found["worst_on"]) == (2.0, 0.5, "b")
 
 
 def test_growth_is_the_exponent_of_the_largest_error_so_far() -> None:
@@ -239,7 +300,7 @@ def test_every_family_says_how_it_is_tuned() -> None:
 
 @pytest.mark.skipif(not solvers.PEERS_PYTHON.is_file(), reason="./hamotor bench --with-peers")
 @pytest.mark.parametrize("name", ["P1", "P3", "P4"])
-def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str, tmp_path: Path) -> None:
+def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str) -> None:
     there = solvers.peers_here({})
     given = problem(name).for_peers
     assert not isinstance(given, str)
@@ -251,20 +312,15 @@ def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str, tmp_path: 
     job = {
         "rounds": 0,
         "enough_s": 0.0,
-        "problems": {name: {**given, "end": end}},
+        "problem": {**given, "end": end},
         "contestants": [
             {
-                "problem": name, "kind": c.kind, "longest_s": 1e9, "settings": [round(end * 1000)],
-                **c.said,
+                "kind": c.kind, "longest_s": 1e9, "settings": [round(end * 1000)], **c.said,
             }
             for c in found
         ],
     }  # fmt: skip
-    file = tmp_path / "job.json"
-    file.write_text(json.dumps(job), encoding="utf-8")
-    with solvers.stopwatch(str(file)) as timing:
-        assert timing.stdout is not None
-        rows = {found[r["contestant"]].name: r for r in map(json.loads, timing.stdout)}
+    rows = {found[index].name: row for (index, _), row in solvers.timed(job).items()}
     expected = endpoint.of_quaternion(
         problem(name).scene, [*first["q"], *first["w"], *first.get("x", ()), *first.get("v", ())]
     )

@@ -20,7 +20,7 @@ def provenance(**more: Any) -> dict[str, Any]:
     return {
         "version": __version__,
         "headers": headers_digest(default_includes()),
-        "date": datetime.now(UTC).isoformat(timespec="seconds"),
+        "date": now_in_words(),
         "python": platform.python_version(),
         "system": platform.system(),
         "machine": platform.machine(),
@@ -31,9 +31,21 @@ def provenance(**more: Any) -> dict[str, Any]:
     }
 
 
+def now_in_words() -> str:
+    """Date and time of day, UTC, to a second."""
+    return datetime.now(UTC).isoformat(timespec="seconds")
+
+
 def say(text: str) -> None:
     """A line of progress."""
     print(text, file=sys.stderr, flush=True)
+
+
+def write_whole(file: Path, text: str) -> None:
+    """Write a file so that whoever reads it sees the old text or the new one."""
+    unfinished = file.with_name(f".{os.getpid()}-{file.name}")
+    unfinished.write_text(text, encoding="utf-8")
+    unfinished.replace(file)
 
 
 def publish(

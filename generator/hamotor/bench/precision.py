@@ -22,7 +22,7 @@ from typing import Any, Final
 import numpy as np
 
 from hamotor.bench import endpoint, solvers
-from hamotor.bench.account import provenance, publish, say
+from hamotor.bench.account import now_in_words, provenance, publish, say, write_whole
 from hamotor.bench.contest import (
     OWN,
     Contestant,
@@ -35,17 +35,26 @@ from hamotor.bench.contest import (
 )
 from hamotor.bench.counting import work_of
 from hamotor.bench.drift import SAMPLES, Conserved, Drift, drifts, of_method, step_of
-from hamotor.bench.precision_report import leaders, rules, standings, table, write_report
+from hamotor.bench.precision_report import (
+    ahead,
+    leaders,
+    over_problems,
+    rules,
+    standings,
+    table,
+    write_report,
+)
 from hamotor.bench.problems import GOALS, TARGETS, Problem, own_problems, problem
-from hamotor.errors import HamotorError, ToolError
+from hamotor.errors import HamotorError, ToolError, UsageError
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.library import SceneLibrary
-from hamotor.run.simulation import Compiled, Simulation, load
+from hamotor.run.report import to_json
+from hamotor.run.simulation import Simulation, load
 from hamotor.scene import METHODS
 from hamotor.scene.scalars import COUNTED
 
 COMPILERS: Final = ("g++", "clang++")
-_LONGEST_RUN_S: Final = 20.0
+_LONGEST_RUN_S: Final = 10.0
 """That a long run of a million steps may take; of more steps in proportion, a tenth of it."""
 
 _FORMS: Final = (
@@ -66,6 +75,11 @@ QUICK: Final = Extent(
 QUICK_PROBLEMS: Final = ("P1", "P3", "P4")
 
 
+_FEW: Final = 8
+"""Of more methods than these one library counts all, in a fifth of the time; a series has text of
+its own."""
+
+
 def bench_precision(
     scenes: Sequence[str] = (),
     out: Path | None = None,
@@ -77,11 +91,12 @@ def bench_precision(
     """Run and account for the benchmark of precision.
 
     scenes: names or paths of scenes; the benchmark's own problems if not given.  out: where
-    precision.json, the diagrams and precision.html go; None: nowhere.  json: print the account on
-    stdout instead of the table.  quick: a method of each family, three problems, fewer settings and
-    repetitions, one compiler, no other kernels or scalars, nothing counted.  with_peers: first
-    install the public solvers that come from PyPI.  drift: steps of the long runs, a million if not
-    given, none if quick.
+    precision.json, the diagrams and precision.html go, written again after every problem, and
+    precision_NAME.json, from which a later call takes what it would only measure again; None:
+    nowhere.  json: print the account on stdout instead of the table.  quick: a method of each
+    family, three problems, fewer settings and repetitions, one compiler, no other kernels or
+    scalars, nothing counted.  with_peers: first install the public solvers that come from PyPI.
+    drift: steps of the long runs, a million if not given, none if quick.
     Returns the account.  Raises UsageError and ToolError as `hamotor run` does.
     """
     gaps: dict[str, str] = {}
@@ -92,11 +107,8 @@ def bench_precision(
     extent = QUICK if quick else FULL
     if drift is not None:
         extent = replace(extent, drift=drift)
-    account = measure([problem(name) for name in names], extent, peers, gaps)
+    account = measure([problem(name) for name in names], extent, peers, gaps, out)
     publish(account, table, out=None, as_json=json)
-    if out is not None:
-        for file in write_report(account, out):
-            say(f"wrote {file}")
     return account
 
 
@@ -105,67 +117,146 @@ def measure(
     extent: Extent,
     peers: Mapping[str, str],
     gaps: Mapping[str, str],
+    out: Path | None = None,
 ) -> dict[str, Any]:
-    """The account of these problems, with the peers there are (package → version)."""
-    began = time.perf_counter()
-    compilers = _compilers(extent)
-    contestants: list[Contestant] = []
-    refused: list[Row] = []
-    said: dict[str, Any] = {}
+    """The account of these problems, with the peers there are (package → version).
+
+    With `out` the report is written after each problem; what was measured before with all the same
+    is read from there.  Of several problems those that cannot be measured are gaps; one alone
+    raises.
+    """
+    about = _provenance(_compilers(extent), peers, extent)
     missing = dict(gaps)
-    for one in problems:
-        say(f"{one.name}: reference")
-        reference = one.reference
-        said[one.name] = {
+    parts: dict[str, Mapping[str, Any]] = {}
+    for index, one in enumerate(problems):
+        kept = out / f"precision_{one.name}.json" if out is not None else None
+        key = _key(one, extent, about)
+        part = _read(kept, key)
+        try:
+            part = part or {"key": key, **_measured(one, extent, peers)}
+        except HamotorError as refusal:
+            if len(problems) == 1:
+                raise
+            missing[one.name] = str(refusal)
+            say(f"{one.name}: {refusal}")
+            continue
+        parts[one.name] = part
+        if out is None or kept is None:
+            continue
+        out.mkdir(parents=True, exist_ok=True)
+        write_whole(kept, to_json(part))
+        waiting = {
+            p.name: "not measured yet; the same command goes on" for p in problems[index + 1 :]
+        }
+        account = _account(parts, {**missing, **waiting}, about)
+        for file in write_report(account, out, [one.name]):
+            say(f"wrote {file}")
+    if not parts:
+        raise UsageError("hamotor bench: none of these scenes can be measured; see above")
+    return _account(parts, missing, about)
+
+
+def _account(
+    parts: Mapping[str, Mapping[str, Any]], missing: Mapping[str, str], about: Mapping[str, Any]
+) -> dict[str, Any]:
+    rows = [row for part in parts.values() for row in part["rows"]]
+    account = {
+        "benchmark": "precision",
+        "targets": list(TARGETS),
+        "problems": {
+            name: {**part["problem"], "leading": ahead(rows, name, part["problem"]["norm"])}
+            for name, part in parts.items()
+        },
+        "rows": rows,
+        "drift": [drift for part in parts.values() for drift in part["drift"]],
+        "not_there": {**missing, **{k: v for p in parts.values() for k, v in p["missing"].items()}},
+        "rules": rules({row["family"] for row in rows}),
+        "provenance": {
+            **about,
+            "wall_s": sum(sum(part["problem"]["wall_s"].values()) for part in parts.values()),
+        },
+    }
+    best = standings(account)
+    return {**account, "best": best, "over_problems": over_problems(best)}
+
+
+def _key(one: Problem, extent: Extent, about: Mapping[str, Any]) -> str:
+    """Of all that a measurement depends on but the time of day."""
+    said = {k: v for k, v in about.items() if k not in ("date", "load")}
+    known = [one.name, one.simulation.spec_hash, one.simulation.end, asdict(extent), said]
+    return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
+
+
+def _read(file: Path | None, key: str) -> dict[str, Any] | None:
+    """What was measured before, if with all the same."""
+    if file is None or not file.is_file():
+        return None
+    try:
+        part: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    except ValueError:
+        return None
+    if part.get("key") != key:
+        return None
+    say(f"{file}: measured {part['problem']['measured']['date']}; remove it to measure again")
+    return part
+
+
+def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[str, Any]:
+    """One problem's part of the account."""
+    watch = {"reference": -time.perf_counter()}
+
+    def next_is(what: str) -> None:
+        now = time.perf_counter()
+        last = list(watch)[-1]
+        watch[last] = round(watch[last] + now, 1)
+        watch[what] = -now
+
+    measured = {"date": now_in_words(), "load": list(os.getloadavg())}
+    compilers = _compilers(extent)
+    missing: dict[str, str] = {}
+    say(f"{one.name}: reference")
+    reference = one.reference
+    next_is("compile")
+    say(f"{one.name}: compiling methods with {compilers[0]}")
+    set_up = _set_up(one, extent)
+    contestants, refused = _scenes(one, compilers[0], extent)
+    if extent.forms and isinstance(one.conformal, str):
+        missing[f"{one.name} in conformal algebra"] = one.conformal
+    if isinstance(one.for_peers, str):
+        missing[f"public solvers on {one.name}"] = one.for_peers
+    else:
+        contestants += solvers.contestants(one.name, compilers, peers, extent, missing)
+    if len(compilers) > 1:
+        ours = [c for c in contestants if c.is_ours and not c.label]
+        first = [asdict(row) for row in _times(one, ours, replace(extent, rounds=0))]
+        leading = leaders(first, one.name, one.norm)
+        for compiler in compilers[1:]:
+            say(f"{one.name}: compiling {', '.join(leading)} with {compiler}")
+            contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
+    next_is("time")
+    say(f"{one.name}: timing")
+    rows = _times(one, contestants, extent)
+    next_is("long_runs")
+    long_runs = _long_runs(one, contestants, compilers[0], extent.drift)
+    next_is("end")
+    del watch["end"]
+    return {
+        "problem": {
             "description": getattr(one.scene, "description", ""),
             "end_s": one.simulation.end,
             "reference": reference.source,
             "certificate": reference.certificate,
             "norm": one.norm,
             "goals": list(GOALS.get(one.name, ())),
-            "set_up": _set_up(one, extent),
-        }
-        say(f"{one.name}: compiling methods with {compilers[0]}")
-        made, failed = _scenes(one, compilers[0], extent)
-        contestants += made
-        refused += failed
-        if extent.forms and isinstance(one.conformal, str):
-            missing[f"{one.name} in conformal algebra"] = one.conformal
-        if isinstance(one.for_peers, str):
-            missing[f"public solvers on {one.name}"] = one.for_peers
-        else:
-            contestants += solvers.contestants(one.name, compilers, peers, extent, missing)
-    if len(compilers) > 1:
-        ours = [c for c in contestants if c.is_ours and not c.label]
-        first = [asdict(row) for row in _times(problems, ours, replace(extent, rounds=0))[0]]
-        for one in problems:
-            leading = leaders(first, one.name, one.norm)
-            for compiler in compilers[1:]:
-                say(f"{one.name}: compiling {', '.join(leading)} with {compiler}")
-                contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
-    say("timing")
-    asked = []
-    if extent.drift:
-        steps_of = {one.name: step_of(one.simulation) for one in problems}
-        asked = solvers.long_runs(
-            contestants, compilers[0], steps_of, extent.drift, SAMPLES, _longest_s(extent.drift)
-        )
-    rows, states = _times(problems, contestants, extent, asked)
-    long_runs = _long_runs(problems, contestants, compilers[0], extent.drift, asked, states)
-    account = {
-        "benchmark": "precision",
-        "targets": list(TARGETS),
-        "problems": said,
+            "set_up": set_up,
+            "scene": one.simulation.spec_hash,
+            "measured": measured,
+            "wall_s": watch,
+        },
         "rows": [asdict(row) for row in refused + rows],
         "drift": [asdict(drift) for drift in long_runs],
-        "not_there": missing,
-        "rules": rules({c.family for c in contestants}),
-        "provenance": {
-            **_provenance(compilers, peers, extent),
-            "wall_s": round(time.perf_counter() - began),
-        },
+        "missing": missing,
     }
-    return {**account, "best": standings(account)}
 
 
 def _longest_s(steps: int) -> float:
@@ -173,39 +264,44 @@ def _longest_s(steps: int) -> float:
 
 
 def _long_runs(
-    problems: Sequence[Problem],
-    contestants: Sequence[Contestant],
-    compiler: str,
-    steps: int,
-    asked: Sequence[Mapping[str, Any]],
-    states: Mapping[int, Mapping[str, Any]],
+    one: Problem, contestants: Sequence[Contestant], compiler: str, steps: int
 ) -> list[Drift]:
-    """The generated kernels in double, and peers; what would take too long takes fewer steps."""
+    """The generated kernels in double, and peers beside them on another core; what would take too
+    long takes fewer steps."""
+    if not steps:
+        return []
+    ours = [c for c in contestants if c.is_ours and not c.label and c.compiler == compiler]
+    if not ours:
+        return []
+    simulation = one.simulation
+    step = step_of(simulation)
+    longest_s = _longest_s(steps)
+    asked = solvers.long_runs(contestants, compiler, step, steps, SAMPLES, longest_s)
+    first, *_ = ours
+    of = Conserved(one, SceneLibrary(Path(first.said["library"])), first.name)
     found: list[Drift] = []
-    conserved: dict[str, Conserved] = {}
-    by_name = {one.name: one for one in problems}
-    for c in contestants:
-        if not steps or not c.is_ours or c.label or c.compiler != compiler:
-            continue
-        library = SceneLibrary(Path(c.said["library"]))
-        of = conserved.setdefault(c.problem, Conserved(by_name[c.problem], library, c.name))
-        simulation = by_name[c.problem].simulation
-        trial, _, _, seconds = of_method(simulation, library, c.name, 1000)
-        affordable = min(steps, int(_longest_s(steps) / max(seconds / max(trial, 1), 1e-9)))
-        say(f"{c.problem}: {affordable:,} steps of {c.name}")
-        done, every, rows, seconds = of_method(simulation, library, c.name, affordable)
-        step = step_of(simulation)
-        failure = None if done == affordable else f"stopped after {done:,} steps"
-        about = Drift(
-            c.problem, c.name, c.family, done, step, "", None, None, None, seconds, failure=failure
-        )
-        found += drifts(about, of, every, every * Fraction(step), rows)
-    for index, said in states.items():
+    with ThreadPoolExecutor(1) as pool:
+        job = {"problem": one.for_peers if asked else None, "long_runs": asked}
+        theirs = pool.submit(solvers.timed, job, max(solvers.SILENT_S, 12 * longest_s))
+        for c in ours:
+            library = SceneLibrary(Path(c.said["library"]))
+            trial, _, _, seconds = of_method(simulation, library, c.name, 1000)
+            affordable = min(steps, int(longest_s / max(seconds / max(trial, 1), 1e-9)))
+            say(f"{one.name}: {affordable:,} steps of {c.name}")
+            done, every, rows, seconds = of_method(simulation, library, c.name, affordable)
+            failure = None if done == affordable else f"stopped after {done:,} steps"
+            about = Drift(
+                one.name, c.name, c.family, done, step, "", None, None, None, seconds,
+                failure=failure,
+            )  # fmt: skip
+            found += drifts(about, of, every, every * Fraction(step), rows)
+        answers = theirs.result()
+    for (index, _), said in sorted(answers.items()):
         run = asked[index]
-        rows = conserved[run["problem"]].rows(said["states"])
-        every, step = said["every"], run["step"]
+        rows = of.rows(said.get("states", ()))
+        every = said.get("every", run["every"])
         about = Drift(
-            problem=run["problem"],
+            problem=one.name,
             contestant=run["name"],
             family=run["family"],
             steps=every * len(rows),
@@ -217,7 +313,7 @@ def _long_runs(
             seconds=said.get("seconds", 0.0),
             failure=said["failure"],
         )
-        found += drifts(about, conserved[run["problem"]], every, Fraction(every * step), rows)
+        found += drifts(about, of, every, Fraction(every * step), rows)
     return found
 
 
@@ -253,6 +349,12 @@ def _scenes(
         choices = [choice for choice in choices if choice[-1] in only]
     cache = default_cache() / "precision" / one.name
 
+    def compiled_to_count(by: tuple[Form, str | None]) -> SceneLibrary:
+        form, method = by
+        simulation = _in_form(one, form)
+        assert simulation is not None
+        return simulation.compile(scalar=COUNTED, kernels=form.kernels, method=method).library
+
     def compiled(choice: tuple[Form, str]) -> Contestant | Row:
         form, method = choice
         simulation = _in_form(one, form)
@@ -260,25 +362,19 @@ def _scenes(
         if form.algebra:
             form = replace(form, algebra=str(one.conformal.scene.algebra))  # type: ignore[union-attr]
 
-        def compiled_for(scalar: str) -> Compiled:
-            return simulation.compile(
-                scalar=scalar,
+        try:
+            built = simulation.compile(
+                scalar=form.scalar,
                 kernels=form.kernels,
                 representation=form.representation,
                 method=method,
             )
-
-        try:
-            built = compiled_for(form.scalar)
         except HamotorError as refusal:
             return Row(
                 one.name, method, "hamotor", form.label, compiler, form.kernels,
                 form.representation, form.algebra or one.algebra, form.scalar, 0.0, "step",
                 failure=str(refusal).splitlines()[0],
             )  # fmt: skip
-        counted = None
-        if extent.counted and form.scalar == "double" and form.representation == "ga":
-            counted = compiled_for(COUNTED).library
         description = built.description
         controlled = method in description.error_controlled
         return Contestant(
@@ -302,11 +398,19 @@ def _scenes(
                 "columns": len(description.columns),
                 "description": description,
             },
-            counted=counted,
+            counted=counting.get(choice),
         )
 
     # A method that the list names and this scene's library has not got is a gap of the list.
     with environment(CXX=compiler, HAMOTOR_CACHE=str(cache)), ThreadPoolExecutor(2) as pool:
+        by = {
+            (form, method): (form, None if len(choices) > _FEW and method != "taylor" else method)
+            for form, method in choices
+            if extent.counted and form.scalar == "double" and form.representation == "ga"
+        }
+        each = dict.fromkeys(by.values())
+        libraries = dict(zip(each, pool.map(compiled_to_count, each), strict=True))
+        counting = {choice: libraries[of] for choice, of in by.items()}
         found = list(pool.map(compiled, choices))
     return (
         [c for c in found if isinstance(c, Contestant)],
@@ -320,24 +424,15 @@ def _in_form(one: Problem, form: Form) -> Simulation | None:
     return None if isinstance(one.conformal, str) else one.conformal.simulation
 
 
-def _times(
-    problems: Sequence[Problem],
-    contestants: Sequence[Contestant],
-    extent: Extent,
-    long_runs: Sequence[Mapping[str, Any]] = (),
-) -> tuple[list[Row], dict[int, Any]]:
-    """Every setting of every contestant, timed in one process; and the peers' long runs."""
+def _times(one: Problem, contestants: Sequence[Contestant], extent: Extent) -> list[Row]:
+    """Every setting of every contestant, timed in one process."""
     job = {
         "rounds": extent.rounds,
         "enough_s": extent.enough_s,
         "loop": solvers.compiled(_compilers(extent)[0], "loop.cpp"),
-        "long_runs": long_runs,
-        "problems": {
-            one.name: None if isinstance(one.for_peers, str) else one.for_peers for one in problems
-        },
+        "problem": None if isinstance(one.for_peers, str) else one.for_peers,
         "contestants": [
             {
-                "problem": c.problem,
                 "kind": c.kind,
                 "settings": list(c.settings),
                 "longest_s": c.longest_s,
@@ -346,30 +441,15 @@ def _times(
             for c in contestants
         ],
     }
-    by_name = {one.name: one for one in problems}
-    rows: list[Row] = []
-    states: dict[int, Any] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "job.json"
-        file.write_text(json.dumps(job), encoding="utf-8")
-        with solvers.stopwatch(str(file)) as timing:
-            assert timing.stdout is not None
-            for line in timing.stdout:
-                said = json.loads(line)
-                if "long_run" in said:
-                    states[said["long_run"]] = said
-                    continue
-                contestant = contestants[said["contestant"]]
-                rows.append(_row(contestant, said, by_name[contestant.problem]))
-        if timing.returncode:
-            raise ToolError("hamotor bench: the process that times stopped; see its message above")
-    order = {(c.problem, c.name, c.label, c.compiler): n for n, c in enumerate(contestants)}
-    rows.sort(key=lambda r: (order[r.problem, r.contestant, r.form, r.compiler], -r.setting))
-    return rows, states
+    answers = solvers.timed(job)
+    return [
+        _row(contestants[contestant], setting, said, one)
+        for (contestant, setting), said in sorted(answers.items())
+    ]
 
 
-def _row(contestant: Contestant, said: Mapping[str, Any], one: Problem) -> Row:
-    setting = contestant.settings[said["setting"]]
+def _row(contestant: Contestant, index: int, said: Mapping[str, Any], one: Problem) -> Row:
+    setting = contestant.settings[index]
     what = "tolerance"
     if contestant.is_ours:
         value = setting["tolerance"]

@@ -7,8 +7,10 @@ import os
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any, Final
 
+from hamotor.bench.account import write_whole
 from hamotor.bench.endpoint import ATTITUDE
 from hamotor.bench.solvers import TUNED
 from hamotor.run.report import to_json
@@ -25,7 +27,9 @@ interleaved over all contestants in one process; median and worst stand beside i
 time that the thread had the processor. Set-up (generation, compilation, building a solver, the \
 first step) is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
-What fails or does not converge is a row and says why.
+What fails or does not converge is a row and says why; so is what takes more than a minute or \
+ends its process, of which nothing finer is tried. Settings go from coarse to fine until two in a \
+row take longer than 15 ms (4 ms if quick), 40 times that where the solver is called from Python.
 Scenes and solvers in C++ are compiled with -O3 -march=native, those that lead by each compiler, \
 of which the faster counts.
 Evaluations are those of rates or forques, and of a Taylor series its order. Operations are \
@@ -41,6 +45,7 @@ Long runs take the scene's step; solvers with a tolerance take 1e-14 and their o
 same time. Relative errors of what is conserved are taken over its size at the start; the \
 attitude, where the motion has a closed form, is held against that in quad. What would take too \
 long takes fewer steps. p is the slope of log error over log steps in the last two decades.
+Problems are measured one after the other; the date of each stands with its reference.
 A peer that is not installed is listed with the command that installs it; what a peer cannot \
 express is listed, too.
 Public solvers integrate a quaternion and body rates (place and velocity): 7 or 13 numbers; \
@@ -127,6 +132,27 @@ def standings(account: Mapping[str, Any]) -> list[dict[str, Any]]:
     return found
 
 
+def over_problems(best: Rows) -> list[dict[str, Any]]:
+    """For each target, how many times as long the best public solver takes as the best of ours:
+    the median and the worst over the problems, and where only one of the two arrives."""
+    found = []
+    for target in dict.fromkeys(row["target"] for row in best):
+        here = [row for row in best if row["target"] == target]
+        ratios = {row["problem"]: row["ratio"] for row in here if row["ratio"] is not None}
+        worst = min(ratios, key=lambda name: ratios[name], default=None)
+        found.append(
+            {
+                "target": target,
+                "median": median(ratios.values()) if ratios else None,
+                "worst": ratios[worst] if worst is not None else None,
+                "worst_on": worst,
+                "only_ours": [r["problem"] for r in here if r["ours"] and not r["peer"]],
+                "only_peers": [r["problem"] for r in here if r["peer"] and not r["ours"]],
+            }
+        )
+    return found
+
+
 def _said(found: Best | None) -> dict[str, Any] | None:
     if found is None:
         return None
@@ -157,6 +183,19 @@ def table(account: Mapping[str, Any]) -> str:
         failures = sum(r["problem"] == name and r["failure"] is not None for r in account["rows"])
         if failures:
             lines.append(f"  {failures} settings failed; they are rows of the account")
+    if len(account["problems"]) > 1:
+        lines += ["", "time of the best public solver over that of the best of ours"]
+        for row in account["over_problems"]:
+            if row["worst"] is not None:
+                lines.append(
+                    f"  {row['target']:>6.0e}  median {row['median']:.2g},"
+                    f" worst {row['worst']:.2g} ({row['worst_on']})"
+                    + (
+                        f"; only ours arrive: {', '.join(row['only_ours'])}"
+                        * bool(row["only_ours"])
+                    )
+                    + (f"; only peers: {', '.join(row['only_peers'])}" * bool(row["only_peers"]))
+                )
     lines += _long_runs(account["drift"])
     lines += ["", *(f"not compared: {who}: {why}" for who, why in account["not_there"].items())]
     said = account["provenance"]
@@ -194,26 +233,32 @@ def _cells(found: Mapping[str, Any] | None, width: int) -> str:
     return f"{time:>{width}}  {found['name']:<28}"
 
 
-def write_report(account: Mapping[str, Any], out: Path) -> list[Path]:
+def write_report(
+    account: Mapping[str, Any], out: Path, drawn: Collection[str] | None = None
+) -> list[Path]:
     """Write precision.json, a diagram of each problem as PNG and SVG, and precision.html.
 
-    Returns the files.  The page holds the whole account and needs no network.
+    drawn: the problems to draw; all if not given.  Returns the files.  The page holds the whole
+    account and needs no network.
     """
     out.mkdir(parents=True, exist_ok=True)
     text = to_json(account)  # a browser reads no NaN
     files = [out / "precision.json", out / "precision.html"]
-    files[0].write_text(text, encoding="utf-8")
+    write_whole(files[0], text)
     whole = json.dumps(json.loads(text))
     # What a script element holds ends at its first end tag, in a string or not.
     page = _PAGE.read_text(encoding="utf-8").replace("@ACCOUNT@", whole.replace("</", "<\\/"))
-    files[1].write_text(page, encoding="utf-8")
-    for name in account["problems"]:
-        files += _draw(account, name, out / f"precision_{name}")
+    write_whole(files[1], page)
+    for name in account["problems"] if drawn is None else drawn:
+        stem = out / f"precision_{name}"
+        files += draw(account, name, [stem.with_suffix(".png"), stem.with_suffix(".svg")])
     return files
 
 
 _PAGE: Final = Path(__file__).resolve().parents[3] / "templates" / "precision.html"
 _SHOWN: Final = 7
+_COARSEST: Final = 1e-3
+_MARKERS: Final = "s^vDP"
 _COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7f3c8d")
 _PEERS: Final = {
     "heyoka": "#000000", "odeint": "#8a5a00", "SUNDIALS": "#b8860b", "Eigen": "#777777",
@@ -221,20 +266,21 @@ _PEERS: Final = {
 }  # fmt: skip
 
 
-def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
-    """Error over time: the methods that are ahead somewhere, and every public solver."""
+def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Sequence[Path]:
+    """Error over time: the methods that are ahead somewhere, and every public solver; those that
+    do not arrive anywhere by their names.
+
+    A bar reaches from the best of the runs to the median.
+    """
     from matplotlib.figure import Figure
 
-    ladders = {
-        name: ladder
-        for (of, name), ladder in by_contestant(account["rows"]).items()
-        if of == problem
-    }
+    ladders = _ladders(account["rows"], problem)
     norm = account["problems"][problem]["norm"]
-    chosen = _ahead(ladders, norm)
+    chosen = ahead(account["rows"], problem, norm)
     figure = Figure(figsize=(8.6, 5.6), layout="constrained")
     ax = figure.subplots()
     colours = iter(_COLOURS)
+    shown: dict[str, int] = {}
     for name in chosen:
         ladder = [
             row
@@ -243,22 +289,30 @@ def _draw(account: Mapping[str, Any], problem: str, stem: Path) -> list[Path]:
         ]
         family = ladders[name][0]["family"]
         ours = family == "hamotor"
-        ax.plot(
+        shown[family] = shown.get(family, -1) + 1
+        ax.errorbar(
             [row["best_us"] for row in ladder],
             [row["errors"][norm] for row in ladder],
-            marker="o" if ours else "s", markersize=3, linewidth=1.6 if ours else 1.1,
-            linestyle="-" if ours else "--", label=name,
+            xerr=[[0.0] * len(ladder), [row["median_us"] - row["best_us"] for row in ladder]],
+            marker="o" if ours else _MARKERS[shown[family] % len(_MARKERS)], markersize=3.5,
+            linewidth=1.6 if ours else 1.1, linestyle="-" if ours else "--", elinewidth=0.7,
+            label=name,
             color=next(colours) if ours else _PEERS[family],
         )  # fmt: skip
+    arrived = {ladders[name][0]["contestant"] for name in chosen}
+    for who in dict.fromkeys(
+        ladder[0]["contestant"] for ladder in ladders.values() if ladder[0]["family"] != "hamotor"
+    ):
+        if who not in arrived:
+            ax.plot([], [], linestyle="", label=f"{who}: not within {_COARSEST:g}")
     for target in account["targets"]:
         ax.axhline(target, color="#eeeeee", linewidth=0.8, zorder=0)
     ax.set_xscale("log")
     ax.set_yscale("log")
-    ax.set_xlabel("time of the whole integration, µs (best of the runs)")
+    ax.set_xlabel("time of the whole integration, µs (best of the runs; bars to the median)")
     ax.set_ylabel(f"error at the end: {norm}")
     ax.set_title(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
     figure.legend(loc="outside right upper", fontsize=8, frameon=False)
-    files = [stem.with_suffix(suffix) for suffix in (".png", ".svg")]
     for file in files:
         unfinished = file.with_name(f".{os.getpid()}-{file.name}")
         figure.savefig(unfinished, dpi=150, format=file.suffix[1:])
@@ -286,8 +340,13 @@ def leaders(rows: Rows, problem: str, norm: str) -> list[str]:
     return [name for name in ladders if name in leading]
 
 
-def _ahead(ladders: Mapping[str, Rows], norm: str) -> list[str]:
-    """Ours by how many decades of error they reach first, and one of each public solver."""
+def _ladders(rows: Rows, problem: str) -> dict[str, list[Mapping[str, Any]]]:
+    return {name: ladder for (of, name), ladder in by_contestant(rows).items() if of == problem}
+
+
+def ahead(rows: Rows, problem: str, norm: str) -> list[str]:
+    """Ours by how many decades of error they reach first, and the public solvers that arrive."""
+    ladders = _ladders(rows, problem)
     decades = [10.0**-k for k in range(3, 13)]
     score: dict[str, float] = {}
     fastest: dict[tuple[str, float], float] = {}
@@ -309,9 +368,9 @@ def _ahead(ladders: Mapping[str, Rows], norm: str) -> list[str]:
             }
             for name, needed in times_here.items():
                 score[name] = score.get(name, 0.0) + min(times_here.values()) / needed
-    ranked = sorted(score, key=lambda name: -score[name])
-    peers: dict[str, str] = {}
-    for name in ranked:
-        if not is_ours(name):
-            peers.setdefault(ladders[name][0]["contestant"], name)
-    return [*[name for name in ranked if is_ours(name)][:_SHOWN], *peers.values()]
+    found: dict[tuple[str, str], str] = {}  # of each the better compiler's
+    for name in sorted(score, key=lambda name: -score[name]):
+        first = ladders[name][0]
+        found.setdefault((first["contestant"], first["form"] if is_ours(name) else ""), name)
+    ours = [name for name in found.values() if is_ours(name)]
+    return [*ours[:_SHOWN], *(name for name in found.values() if not is_ours(name))]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from typing import Any, Final
 import numpy as np
 
 from hamotor.bench import endpoint
+from hamotor.bench.account import write_whole
 from hamotor.bench.endpoint import ATTITUDE, POSITION, Endpoint
 from hamotor.errors import HamotorError, UsageError
 from hamotor.run.build import default_cache, default_includes, headers_digest
@@ -130,11 +130,7 @@ def _conformal(one: Problem) -> Problem | str:
     ]
     file = default_cache() / "twins" / f"{one.name}.toml"
     file.parent.mkdir(parents=True, exist_ok=True)
-    unfinished = file.with_name(f".{os.getpid()}-{file.name}")
-    unfinished.write_text(
-        "\n".join([f'algebra = "{algebra}"', f'group = "{group}"', *kept]) + "\n", encoding="utf-8"
-    )
-    unfinished.replace(file)
+    write_whole(file, "\n".join([f'algebra = "{algebra}"', f'group = "{group}"', *kept]) + "\n")
     try:
         return Problem(one.name, load(file))
     except HamotorError as refusal:
@@ -179,9 +175,7 @@ def _computed(simulation: Simulation) -> Reference:
         ]
         kept = {"row": row, "apart": apart}
         file.parent.mkdir(parents=True, exist_ok=True)
-        unfinished = file.with_name(f".{os.getpid()}-{file.name}")
-        unfinished.write_text(json.dumps(kept), encoding="utf-8")
-        unfinished.replace(file)
+        write_whole(file, json.dumps(kept))
     rows, apart = kept["row"], kept["apart"]
     for run, distance in zip(runs[1:], apart, strict=True):
         if not distance < _LARGEST_DOUBT:

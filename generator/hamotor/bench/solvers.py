@@ -6,8 +6,11 @@ import ctypes
 import json
 import subprocess
 import sys
+import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from queue import Empty, Queue
+from threading import Thread
 from typing import Any, Final
 
 from hamotor.bench.account import say
@@ -51,6 +54,8 @@ _INCLUDES: Final = ("/usr/include", "/usr/local/include", "/opt/homebrew/include
 _PYTHON_IS_SLOWER: Final = 40
 """How many times as long as others those may take that are called from Python."""
 _TIGHT: Final = 1e-14
+SILENT_S: Final = 60.0
+"""How long the stopwatch may be at one setting: some hundred times what any takes."""
 
 
 def install_peers() -> None:
@@ -72,6 +77,63 @@ def stopwatch(*arguments: str) -> subprocess.Popen[str]:
         stdout=subprocess.PIPE,
         text=True,
     )
+
+
+def timed(job: Mapping[str, Any], silent_s: float = SILENT_S) -> dict[tuple[int, int], Any]:
+    """What the stopwatch says of a job, by contestant (or long run) and setting.
+
+    What it was at when it had said nothing for `silent_s`, or ended, is a failure; the rest is
+    begun again without this contestant's finer settings.
+    """
+    answers: dict[tuple[int, int], Any] = {}
+    skipped: dict[int, int] = {}
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "job.json"
+        while True:
+            file.write_text(json.dumps({**job, "skipped": list(skipped.items())}), encoding="utf-8")
+            met = _timed_until(str(file), silent_s, answers)
+            if met is None:
+                return answers
+            at, why = met
+            if at is None:
+                raise ToolError(f"hamotor bench: {why}; see its message above")
+            say(f"hamotor bench: {why}; that is a row, the rest begins again")
+            skipped[at[0]] = at[1]
+            answers[at] = {"failure": why}
+
+
+def _timed_until(
+    file: str, silent_s: float, answers: dict[tuple[int, int], Any]
+) -> tuple[tuple[int, int] | None, str] | None:
+    """Gather answers until the stopwatch is done, None, or had to be given up: at what, and why."""
+    lines: Queue[str | None] = Queue()
+    at: tuple[int, int] | None = None
+    why = ""
+    with stopwatch(file) as timing:
+        stdout = timing.stdout
+        assert stdout is not None
+
+        def listen() -> None:
+            for line in stdout:
+                lines.put(line)
+            lines.put(None)
+
+        listener = Thread(target=listen, daemon=True)
+        listener.start()
+        try:
+            while (line := lines.get(timeout=silent_s)) is not None:
+                said = json.loads(line)
+                at = int(said.pop("index")), int(said.pop("setting"))
+                if said:
+                    answers[at] = said
+            if timing.wait():
+                why = f"the process that times ended with {timing.returncode}"
+        except Empty:
+            why = f"timed out: nothing for {silent_s:g} s"
+        finally:
+            timing.kill()
+            listener.join()
+    return (at, why) if why else None
 
 
 def peers_here(gaps: dict[str, str]) -> dict[str, str]:
@@ -198,20 +260,19 @@ def contestants(
 
 
 def long_runs(
-    contestants: Sequence[Contestant], compiler: str, steps_of: Mapping[str, float], steps: int,
-    samples: int, longest_s: float,
+    contestants: Sequence[Contestant], compiler: str, step: float, steps: int, samples: int,
+    longest_s: float,
 ) -> list[dict[str, Any]]:  # fmt: skip
     """What the stopwatch is asked for: `steps` steps of the scene's, or the time that they take
     with a tight tolerance, of one of each solver."""
     samples = min(samples, steps)
     return [
         {
-            "problem": c.problem,
             "name": c.name,
             "family": c.family,
             "kind": c.kind,
             "options": c.said["options"],
-            "step": steps_of[c.problem],
+            "step": step,
             "every": steps // samples,
             "samples": samples,
             "tolerance": 0.0 if c.fixed_steps else _TIGHT,

@@ -18,6 +18,7 @@ from typing import Any, Final
 
 from hamotor.bench.account import provenance, publish
 from hamotor.errors import UsageError
+from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.comparison import compare
 from hamotor.run.result import Run
 from hamotor.run.simulation import Simulation, load
@@ -87,7 +88,10 @@ def bench_steps(
         "error": "distance at the end from a run in long double with shorter steps",
         "rows": [asdict(row) for row in rows],
         "families": [asdict(family) for family in families(rows)],
-        "provenance": provenance(),
+        "provenance": provenance(
+            compiler=find_compiler(default_cache()).version,
+            flags=" ".join(flags_for(os.uname().machine)),
+        ),
     }
     publish(account, table, out=out, as_json=json)
     return account
@@ -233,9 +237,23 @@ def table(account: Mapping[str, Any]) -> str:
             f"  {row['method']:<15} {row['form']:<10} {row['ns_per_step']:>9.1f}"
             f" {row['ratio']:>7.2f}  {errors}"
         )
-    lines += ["", "times as long as generated kernels, by family"]
-    lines += [
-        f"  {ratio['scene']:<16} {ratio['family']:<14} {ratio['form']:<8} {ratio['ratio']:7.2f}"
-        for ratio in account["families"]
+    lines += ["", "times as long as generated kernels, by family", ""]
+    return "\n".join([*lines, *families_table(account["families"])])
+
+
+def families_table(ratios: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The ratios in Markdown: families and forms by scene."""
+    scenes = list(dict.fromkeys(ratio["scene"] for ratio in ratios))
+    found: dict[tuple[str, str], dict[str, float]] = {}
+    for ratio in ratios:
+        found.setdefault((ratio["form"], ratio["family"]), {})[ratio["scene"]] = ratio["ratio"]
+    first = max((len(f"{family}, {form}") for form, family in found), default=0)
+    lines = [
+        " | ".join([f"| {'':<{first}}", *scenes]) + " |",
+        "|---" * (len(scenes) + 1) + "|",
     ]
-    return "\n".join(lines)
+    for (form, family), row in sorted(found.items()):
+        cells = [f"{row[scene]:.1f}" if scene in row else "–" for scene in scenes]
+        aligned = [f"{cell:>{len(scene)}}" for cell, scene in zip(cells, scenes, strict=True)]
+        lines.append(" | ".join([f"| {f'{family}, {form}':<{first}}", *aligned]) + " |")
+    return lines

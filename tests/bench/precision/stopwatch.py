@@ -65,8 +65,8 @@ class CompiledScene:
 class Entry:
     """One setting of one contestant, and what was seen of it."""
 
-    def __init__(self, contestant: int, setting: int, timed: Any) -> None:
-        self.contestant, self.setting, self.timed = contestant, setting, timed
+    def __init__(self, at: Mapping[str, int], timed: Any) -> None:
+        self.at, self.timed = dict(at), timed
         self.seconds: list[float] = []
         self.processor_s = float("inf")
         self.last: peers.Result | None = None
@@ -83,8 +83,7 @@ class Entry:
         """What is written of it."""
         assert self.last is not None
         return {
-            "contestant": self.contestant,
-            "setting": self.setting,
+            **self.at,
             "best_s": min(self.seconds),
             "median_s": median(self.seconds),
             "worst_s": max(self.seconds),
@@ -98,35 +97,39 @@ class Entry:
 
 
 def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """What each setting gave, and what failed, problem by problem."""
-    for name, said in job["problems"].items():
-        problem = peers.Problem(said) if said else None
-        entries = []
-        for index, contestant in enumerate(job["contestants"]):
-            if contestant["problem"] != name:
+    """What each setting gave, and what failed; before each, which comes."""
+    problem = peers.Problem(job["problem"]) if job["problem"] else None
+    skipped = dict(job.get("skipped", ()))
+    entries = []
+    for index, contestant in enumerate(job.get("contestants", ())):
+        slow = 0
+        for number, setting in enumerate(contestant["settings"][: skipped.get(index)]):
+            at = {"index": index, "setting": number}
+            yield at
+            try:
+                entry = Entry(at, _timed(job, contestant, setting, problem))
+                entry.run()
+                if min(entry.seconds) > contestant["longest_s"]:
+                    entry.run()  # it may have been disturbed
+            except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
+                yield {**at, "failure": str(problem_met)}
                 continue
-            slow = 0
-            for number, setting in enumerate(contestant["settings"]):
-                try:
-                    entry = Entry(index, number, _timed(job, contestant, setting, problem))
-                    entry.run()
-                    if min(entry.seconds) > contestant["longest_s"]:
-                        entry.run()  # it may have been disturbed
-                except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
-                    yield {"contestant": index, "setting": number, "failure": str(problem_met)}
-                    continue
-                entries.append(entry)
-                slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
-                if slow == 2:
-                    break
-        for _ in range(job["rounds"]):
-            for entry in entries:
-                if len(entry.seconds) < 3 or sum(entry.seconds) < job["enough_s"]:
-                    entry.run()
+            entries.append(entry)
+            slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
+            if slow == 2:
+                break
+    for _ in range(job.get("rounds", 0)):
         for entry in entries:
-            yield entry.row()
+            if len(entry.seconds) < 3 or sum(entry.seconds) < job["enough_s"]:
+                yield entry.at
+                entry.run()
+    for entry in entries:
+        yield entry.row()
     for index, asked in enumerate(job.get("long_runs", ())):
-        yield {"long_run": index, **long_run(asked, job["problems"][asked["problem"]])}
+        at = {"index": index, "setting": 0}
+        if index not in skipped:
+            yield at
+            yield {**at, **long_run(asked, job["problem"])}
 
 
 def long_run(asked: Mapping[str, Any], said: Mapping[str, Any]) -> dict[str, Any]:
