@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -10,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hamotor.errors import ToolError
+from hamotor.errors import ToolError, UsageError
 from hamotor.run import build
 from hamotor.run.build import compile_scene, find_compiler, headers_digest
 
@@ -159,6 +160,37 @@ def test_the_flags_keep_the_bits_of_the_kernels() -> None:
     assert "-march=native" in build.flags_for("x86_64")
     assert "-mcpu=native" in build.flags_for("aarch64")
     assert not any("fast-math" in flag for flag in build.flags_for("x86_64"))
+
+
+def test_an_instruction_set_can_be_forced(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(build, "_cpuinfo_lines", lambda: ["flags : sse2 avx2 fma bmi1 bmi2"])
+    monkeypatch.setenv("HAMOTOR_ISA", "avx2")
+    assert {"-march=x86-64", "-mavx2", "-mfma"} < set(build.flags_for("x86_64"))
+    assert "-march=native" not in build.flags_for("x86_64")
+    for name, message in (
+        ("avx512", "no avx512f"),
+        ("avx3", 'is "avx3"; allowed are sse2, avx2, avx512. Did you mean "avx2"'),
+    ):
+        monkeypatch.setenv("HAMOTOR_ISA", name)
+        with pytest.raises(UsageError, match=message):
+            build.flags_for("x86_64")
+    with pytest.raises(UsageError, match="is for x86-64"):
+        build.flags_for("aarch64")
+
+
+def test_cmake_and_scenes_mean_the_same_instruction_sets() -> None:
+    text = (build.REPOSITORY / "cmake" / "HamotorDispatch.cmake").read_text(encoding="utf-8")
+    sets: dict[str, tuple[str, ...]] = {}
+    for name in build.INSTRUCTION_SETS:
+        found = re.search(rf"set\(HAMOTOR_ISA_{name}_OPTIONS([^)]*)\)", text)
+        assert found
+        words = found[1].replace("${HAMOTOR_ISA_avx2_OPTIONS}", " ".join(sets.get("avx2", ())))
+        sets[name] = tuple(word for word in words.split() if word != '""')
+        features = re.search(rf"set\(HAMOTOR_ISA_{name}_FEATURES([^)]*)\)", text)
+        assert features
+        asked = features[1].replace("${HAMOTOR_ISA_avx2_FEATURES}", "avx2 fma bmi bmi2").split()
+        assert [f"-m{word}" for word in asked if word != '""'] == list(sets[name])
+    assert sets == build.INSTRUCTION_SETS
 
 
 def test_the_cache_can_be_moved(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

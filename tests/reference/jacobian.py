@@ -9,9 +9,7 @@ defining power series, summed with many digits over products from the oracle.
 
 from __future__ import annotations
 
-import hashlib
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -21,13 +19,12 @@ from typing import Any
 
 import mpmath
 from tests.reference.oracle import Oracle, added, scaled
-from tests.reference.ulp import processor_can_fuse
+from tests.reference.program import program
 
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.spec import bundled_path, read_algebra
 
 ROOT = Path(__file__).resolve().parents[2]
-BUILDS = ROOT / ".hamotor" / "build" / "jacobian"
 SOURCE = Path(__file__).with_name("jacobian.cpp")
 TABLE = Path(__file__).with_name("jacobian.md")
 BOUND = 4.0
@@ -64,29 +61,8 @@ class Measurement:
     nan: int
 
 
-def program() -> Path:
-    """The compiled jacobian.cpp; built once for the same text, headers and flags."""
-    fused = ["-mfma"] if processor_can_fuse() and os.uname().machine == "x86_64" else []
-    flags = ["-std=gnu++20", "-O2", "-ffp-contract=off", *fused]
-    identity = hashlib.sha256(" ".join(flags).encode())
-    headers = [p for f in ("generated", "runtime/include") for p in (ROOT / f).rglob("*.hpp")]
-    for path in (SOURCE, *sorted(headers)):
-        identity.update(path.read_bytes())
-    target = BUILDS / f"jacobian-{identity.hexdigest()[:16]}"
-    if not target.exists():
-        BUILDS.mkdir(parents=True, exist_ok=True)
-        for older in BUILDS.glob(f"jacobian-{'?' * 16}"):
-            older.unlink(missing_ok=True)
-        unfinished = BUILDS / f"{os.getpid()}-{target.name}"
-        folders = [f"-I{ROOT / folder}" for folder in ("generated", "runtime/include")]
-        command = ["g++", *flags, *folders, str(SOURCE), "-o", str(unfinished), "-lquadmath"]
-        subprocess.run(command, check=True)
-        unfinished.replace(target)
-    return target
-
-
 def _lines(mode: str, points: int, groups: Sequence[str]) -> list[dict[str, Any]]:
-    command = [str(program()), mode, str(points), *groups]
+    command = [str(program(SOURCE)), mode, str(points), *groups]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     return [json.loads(line.replace(": inf", ": Infinity")) for line in run.stdout.splitlines()]
 

@@ -22,7 +22,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from hamotor.errors import ToolError
+from hamotor.errors import ToolError, UsageError, suggest
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 """The checkout this package runs from: `generated/` and `runtime/` lie here."""
@@ -91,17 +91,46 @@ def eigen() -> Path:
     )
 
 
+_AVX2 = ("-mavx2", "-mfma", "-mbmi", "-mbmi2")
+INSTRUCTION_SETS = {
+    "sse2": (),
+    "avx2": _AVX2,
+    "avx512": (*_AVX2, "-mavx512f", "-mavx512cd", "-mavx512bw", "-mavx512dq", "-mavx512vl"),
+}
+"""Those of x86-64 that $HAMOTOR_ISA names: what compilers are told beside -march=x86-64."""
+
+
+def _processor_flags(machine: str) -> tuple[str, ...]:
+    """For this processor, or for those that have what $HAMOTOR_ISA names."""
+    forced = os.environ.get("HAMOTOR_ISA", "")
+    if not forced:
+        return ("-mcpu=native" if machine in {"aarch64", "arm64"} else "-march=native",)
+    if machine not in {"x86_64", "AMD64"}:
+        raise UsageError(f"HAMOTOR_ISA is for x86-64; scenes on {machine} have one form.")
+    if forced not in INSTRUCTION_SETS:
+        raise UsageError(
+            f'HAMOTOR_ISA is "{forced}"; allowed are {", ".join(INSTRUCTION_SETS)}.'
+            f"{suggest(forced, INSTRUCTION_SETS)}"
+        )
+    has = {x for line in _cpuinfo_lines() if line.startswith("flags") for x in line.split()}
+    for option in INSTRUCTION_SETS[forced] if has else ():
+        feature = option.removeprefix("-m")
+        if {feature, f"{feature}1"}.isdisjoint(has):  # /proc/cpuinfo counts the first BMI
+            raise UsageError(f'HAMOTOR_ISA is "{forced}"; this processor has no {feature}.')
+    return ("-march=x86-64", *INSTRUCTION_SETS[forced])
+
+
 def flags_for(machine: str) -> tuple[str, ...]:
     """The flags every scene is compiled with on a machine of this kind.
 
+    For its own processor, unless $HAMOTOR_ISA names an instruction set.
     `-ffp-contract=off` because the kernels say themselves where a multiply-add is fused; no
     `-ffast-math`, because the order of the sums is part of the result.
     """
-    native = "-mcpu=native" if machine in {"aarch64", "arm64"} else "-march=native"
     return (
         "-std=c++20",
         "-O3",
-        native,
+        *_processor_flags(machine),
         "-ffp-contract=off",
         "-fno-math-errno",
         "-shared",

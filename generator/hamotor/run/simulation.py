@@ -130,7 +130,7 @@ class Simulation:
             check_method(method, self.offered_to_ensembles if ensembles else offered)
             source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
         if ensembles:
-            source = f"#define HAMOTOR_ENSEMBLE\n{source}"
+            source = f"#define HAMOTOR_ENSEMBLE\n#define HAMOTOR_FUSED\n{source}"
         generate_s = time.perf_counter() - started
         shown = NoProgress() if progress is None else progress
         build = compile_scene(

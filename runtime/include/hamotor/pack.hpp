@@ -171,6 +171,10 @@ class Pack {
       if constexpr (W == 4) return Pack(Vector(_mm_sqrt_ps(x.v_)));
     }
 #endif
+#if defined(__aarch64__) && defined(__ARM_NEON)
+    if constexpr (std::same_as<T, double> && W == 2) return Pack(Vector(vsqrtq_f64(x.v_)));
+    if constexpr (std::same_as<T, float> && W == 4) return Pack(Vector(vsqrtq_f32(x.v_)));
+#endif
     return each([](T y) { return std::sqrt(y); }, x);
   }
 
@@ -413,11 +417,13 @@ template <class T, std::size_t W, class ByTurns, class Library>
   if constexpr (std::same_as<T, double> && has_fused_multiply_add) {
     const auto near = scalar::abs(x) < hamotor::Pack<T, W>(1e8);
     const auto turned = QuarterTurns<S>::of(x);
-    // The rest in two words: the last digit of a sine is that of its angle.
+    // The rest in two words: the last digit of a sine is that of its angle.  Beside multiples of
+    // π/2 the first two terms cancel, so that their difference is found without an error.
     const S first = scalar::fma(-turned.quarters, S(0x1.921fb54442d18p+0), x);
-    const S hi = scalar::fma(-turned.quarters, S(0x1.1a62633145c07p-54), first);
-    const S lo = scalar::fma(-turned.quarters, S(-0x1.f1976b7ed8fbcp-110),
-                             scalar::fma(-turned.quarters, S(0x1.1a62633145c07p-54), first - hi));
+    const S second = turned.quarters * S(-0x1.1a62633145c07p-54);
+    const S second_lo = -scalar::fma(turned.quarters, S(0x1.1a62633145c07p-54), second);
+    const auto [hi, sum_lo] = scalar::two_sum(first, second);
+    const S lo = scalar::fma(-turned.quarters, S(-0x1.f1976b7ed8fbcp-110), sum_lo + second_lo);
     const S square = hi * hi;
     const S cosine = S(1) + mul_add(-lo, hi, square * cosine_series(square));
     const S sine = hi + mul_add(hi * square, sine_series(square), lo * cosine);
@@ -454,13 +460,14 @@ template <std::size_t W>
 
 template <class T, std::size_t W>
 [[nodiscard]] Pack<T, W> sin(const Pack<T, W>& x) noexcept {
-  return detail::of_angle(
+  const Pack<T, W> value = detail::of_angle(
       x,
       [](const auto& turned, const auto& sine, const auto& cosine) {
-        const auto value = select(turned.odd(), cosine, sine);
-        return select(turned.opposite(), -value, value);
+        const auto some = select(turned.odd(), cosine, sine);
+        return select(turned.opposite(), -some, some);
       },
       [](T y) { return std::sin(y); });
+  return select(x == Pack<T, W>(0), x, value);  // −0 too
 }
 
 template <class T, std::size_t W>

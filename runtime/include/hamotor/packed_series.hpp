@@ -8,8 +8,10 @@
 
 #include "hamotor/scalar.hpp"
 
-#if defined(__AVX512F__) && defined(__GNUC__)
+#if defined(__GNUC__) && (defined(__AVX512F__) || defined(HAMOTOR_FUSED))
 #define HAMOTOR_PACKS 1
+#endif
+#if defined(__AVX512F__) && defined(__GNUC__)
 #include <immintrin.h>
 #endif
 
@@ -39,15 +41,26 @@ struct Pack {
 template <class S>
 using Lanes = typename Pack<S>::Lanes;
 
-[[nodiscard]] HAMOTOR_INLINE inline Lanes<double> packed_mul_add(Lanes<double> a, Lanes<double> b,
-                                                                 Lanes<double> c) noexcept {
+#ifdef __AVX512F__
+[[nodiscard]] HAMOTOR_INLINE inline Lanes<double> packed_mul_add(const Lanes<double>& a,
+                                                                 const Lanes<double>& b,
+                                                                 const Lanes<double>& c) noexcept {
   return _mm512_fmadd_pd(a, b, c);
 }
 
-[[nodiscard]] HAMOTOR_INLINE inline Lanes<float> packed_mul_add(Lanes<float> a, Lanes<float> b,
-                                                                Lanes<float> c) noexcept {
+[[nodiscard]] HAMOTOR_INLINE inline Lanes<float> packed_mul_add(const Lanes<float>& a,
+                                                                const Lanes<float>& b,
+                                                                const Lanes<float>& c) noexcept {
   return _mm256_fmadd_ps(a, b, c);
 }
+#else
+template <class V>
+[[nodiscard]] HAMOTOR_INLINE inline V packed_mul_add(const V& a, const V& b, const V& c) noexcept {
+  V sum = c;
+  for (int k = 0; k < 8; ++k) sum[k] = mul_add(a[k], b[k], c[k]);
+  return sum;
+}
+#endif
 
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE inline Lanes<S> load(const S* from) noexcept {

@@ -53,15 +53,22 @@ int quadmath_snprintf(char*, std::size_t, const char*, ...) noexcept;
 #define HAMOTOR_INLINE
 #endif
 
+/// With HAMOTOR_FUSED multiply-adds are rounded once on every processor, by the C library's
+/// function where it has no instruction for them (ten times slower), so that the bits are the same
+/// on all.
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(HAMOTOR_FUSED)
+#define HAMOTOR_FUSES 1
+#endif
+
 namespace hamotor {
 
-/// a b + c in a fixed order: one rounding where the hardware has a fused multiply-add, two where it
-/// has not (a software fma is ten times slower).  The only customisation point of the products.
+/// a b + c in a fixed order: one rounding where the hardware has a fused multiply-add or
+/// HAMOTOR_FUSED is defined, else two.  The only customisation point of the products.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S mul_add(const S& a, const S& b, const S& c) noexcept {
   // A scalar's own, which it cannot bring as an overload: kernels call this one by its full name.
   if constexpr (requires { S::multiply_add(a, b, c); }) return S::multiply_add(a, b, c);
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#ifdef HAMOTOR_FUSES
 #if defined(__clang__)
   // clang does not evaluate the builtin at compile time; constants are rounded twice there.
   if (std::is_constant_evaluated()) return a * b + c;
@@ -182,7 +189,7 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr bool any(bool condition) noexcept { return condition; }
 
 /// Whether `mul_add` rounds once for double.
-#if defined(__FMA__) || defined(__ARM_FEATURE_FMA)
+#ifdef HAMOTOR_FUSES
 inline constexpr bool has_fused_multiply_add = true;
 #else
 inline constexpr bool has_fused_multiply_add = false;
