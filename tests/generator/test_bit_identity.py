@@ -28,15 +28,30 @@ from hamotor.codegen import bundled_algebras
 ALGEBRAS = bundled_algebras()
 
 
+FORMS = {
+    "fma": (True, [(c, level) for c in COMPILERS for level in LEVELS]),
+    "two roundings": (False, [("g++", "-O1"), ("clang++", "-O0")]),
+    "two roundings, all": (False, [(c, level) for c in COMPILERS for level in LEVELS]),
+}
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("fused", [False, True], ids=["two roundings", "fma"])
+@pytest.mark.parametrize(
+    ("fused", "compiled"),
+    [
+        pytest.param(*form, id=name, marks=pytest.mark.long if "all" in name else ())
+        for name, form in FORMS.items()
+    ],
+)
 @pytest.mark.parametrize("algebra", ALGEBRAS)
-def test_every_compiler_and_level_gives_the_pinned_bits(algebra: str, fused: bool) -> None:
+def test_every_compiler_and_level_gives_the_pinned_bits(
+    algebra: str, fused: bool, compiled: list[tuple[str, str]]
+) -> None:
     if not processor_can(fused):
         pytest.skip(f"this processor runs only code {'without' if fused else 'with'} hardware fma")
     if missing := [name for name in COMPILERS if shutil.which(name) is None]:
         pytest.skip(f"not installed: {', '.join(missing)}")
-    builds = [Build(algebra, c, level, fused) for c in COMPILERS for level in LEVELS]
+    builds = [Build(algebra, *how, fused) for how in compiled]
     pins = pinned()
     wrong = [
         f"{build}, {scalar}{where}: {algebra} {kernel}"

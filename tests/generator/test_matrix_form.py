@@ -72,7 +72,8 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 def both(scene: str, scalar: str = "long_double") -> tuple[hamotor.Simulation, list[SceneLibrary]]:
     simulation = hamotor.load(scene)
     return simulation, [
-        simulation.compile(scalar=scalar, representation=form).library for form in ("ga", "matrix")
+        simulation.compile(scalar=scalar, method="rkmk4").library,
+        simulation.compile(scalar=scalar, representation="matrix").library,
     ]
 
 

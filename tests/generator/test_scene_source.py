@@ -25,8 +25,10 @@ def scene(text: str) -> Scene:
     return parse_scene(text.encode(), name="test", file="test.toml")
 
 
-def library(of: Scene, scalar: str = "double") -> SceneLibrary:
-    return SceneLibrary(compile_scene(scene_source(of, scalar=scalar)).library)
+def library(of: Scene, method: str, scalar: str = "double") -> SceneLibrary:
+    source = scene_source(of, scalar=scalar)
+    text = f'#define HAMOTOR_METHOD "{method}"\n{source}'
+    return SceneLibrary(compile_scene(text).library)
 
 
 class TestText:
@@ -252,7 +254,7 @@ def test_a_compiled_scene_moves_as_newton_and_euler_say(group: str) -> None:
     """Matrix inertia, centres of mass off the origin, gravity, both springs, two bodies."""
     of, end = scene(BODIES[group] + TIME.decode()), 1.0
     rotations, places = newton_euler(of, end, 1000)
-    compiled = library(of)
+    compiled = library(of, "rkmk4")
     size = len(of.group.motor) + len(of.group.generators)
     with compiled.start("rkmk4", step=end / 1000, state=of.initial_state) as run:
         assert run.state() == pytest.approx(of.initial_state, abs=2e-15)
@@ -272,7 +274,7 @@ def test_a_compiled_scene_moves_as_newton_and_euler_say(group: str) -> None:
 def test_a_compiled_scene_conserves_what_it_says(name: str) -> None:
     """And what Python says of the start is what the library observes there."""
     of = read_scene(name)
-    compiled = library(of)
+    compiled = library(of, "splitting2")
     column = compiled.description.column_index
     with compiled.start("splitting2", step=1e-4, state=of.initial_state) as run:
         first = run.observe()
@@ -305,7 +307,7 @@ angular_velocity = [1, 2, 3]
 """
     bodies = IN_SPACE.replace("{velocity}", "")
     of = scene('algebra = "pga3"\n' + bodies + free + SPATIAL_SPRINGS + TIME.decode())
-    compiled = library(of)
+    compiled = library(of, "splitting2")
     names = [q.name for q in compiled.description.conserved]
     assert "spatial_momentum.e23_about_axis" in names
     assert "free.casimir.p_dot_pi" in names
@@ -377,7 +379,7 @@ def test_a_scene_file_reaches_the_oracle(oracle: str) -> None:
     expected = json.loads((ORACLES / f"{oracle}.json").read_text(encoding="utf-8"))
     of = scene(ORACLE_SCENES[oracle] + TIME.decode())
     step, time = 2.0**-11, 0.0
-    with library(of).start("rkmk4", step=step, state=of.initial_state) as run:
+    with library(of, "rkmk4").start("rkmk4", step=step, state=of.initial_state) as run:
         for there in expected["states"]:
             steps = round((float(there["t"]) - time) / step)
             time = float(there["t"])
@@ -426,7 +428,9 @@ parameters = { k = 6.0, a = [0.2, 0.1, 2.0], l = 0.8 }
     ends = []
     for acting in (spring, potential):
         of = scene(f"{head}{acting}[time]\nend = 1\nstep = 0.01\n")
-        with library(of).start("splitting2", step=0.01, state=of.initial_state) as run:
+        with library(of, "splitting2").start(
+            "splitting2", step=0.01, state=of.initial_state
+        ) as run:
             run.advance(200, 1, None)
             ends.append(run.state())
     assert ends[0] == pytest.approx(ends[1], abs=1e-13)

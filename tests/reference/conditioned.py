@@ -280,16 +280,20 @@ def source(algebra: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def program(algebra: str, *, fused: bool) -> Path:
-    """The compiled measuring program; built once for the same text, headers and flags."""
-    flags = ["-std=gnu++20", "-O1", "-ffp-contract=off", *(["-mfma"] if fused else [])]
+def program(algebra: str, *, fused: bool, points: int) -> Path:
+    """The compiled measuring program; built once for the same text, headers and flags.
+
+    For few points it is not worth optimising.
+    """
+    level = "-O0" if points < 1000 else "-O1"
+    flags = ["-std=gnu++20", level, "-ffp-contract=off", *(["-mfma"] if fused else [])]
     text = source(algebra)
     identity = hashlib.sha256((" ".join(flags) + text).encode())
     headers = [MEASURE, *(ROOT / "runtime" / "include" / "hamotor").glob("*.hpp")]
     headers += (ROOT / "generated" / "hamotor" / algebra).glob("*.hpp")
     for path in sorted(headers):
         identity.update(path.read_bytes())
-    stem = f"conditioned-{algebra}-{'fma' if fused else 'plain'}"
+    stem = f"conditioned-{algebra}{level}-{'fma' if fused else 'plain'}"
     target = BUILDS / f"{stem}-{identity.hexdigest()[:16]}"
     if not target.exists():
         BUILDS.mkdir(parents=True, exist_ok=True)
@@ -309,7 +313,7 @@ def program(algebra: str, *, fused: bool) -> Path:
 def _lines(
     algebra: str, mode: str, scalar: str, points: int, *, fused: bool
 ) -> list[dict[str, Any]]:
-    command = [str(program(algebra, fused=fused)), mode, scalar, str(points)]
+    command = [str(program(algebra, fused=fused, points=points)), mode, scalar, str(points)]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     text = run.stdout.replace(": inf", ": Infinity").replace(": -nan", ": NaN")
     return [json.loads(line.replace(": nan", ": NaN")) for line in text.splitlines()]
@@ -377,7 +381,7 @@ def measurements(
     for algebra in algebras:
         source(algebra)
     with ThreadPoolExecutor(2) as pool:
-        list(pool.map(lambda algebra: program(algebra, fused=fused), algebras))
+        list(pool.map(lambda algebra: program(algebra, fused=fused, points=points), algebras))
         jobs = [(algebra, scalar) for algebra in algebras for scalar in SCALARS]
         return [m for found in pool.map(measured, jobs) for m in found]
 

@@ -124,7 +124,7 @@ TYPED_TEST(Group, rkmk4_has_order_4) {
 
 TYPED_TEST(Group, gauss_collocation_has_order_4_and_keeps_the_spatial_momentum) {
   using Gauss4 = hamotor::Gauss4<Quadratic<TypeParam>>;
-  const auto reference = this->template stepped_with<hamotor::Gauss8<Quadratic<TypeParam>>>(80);
+  const auto reference = this->template stepped_with<Gauss4>(320);
   constexpr int steps = TypeParam::dimension > 3 ? 20 : 10;
   const auto end = this->template stepped_with<Gauss4>(2 * steps);
   const double coarse = this->error(this->template stepped_with<Gauss4>(steps), reference);

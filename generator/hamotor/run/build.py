@@ -333,7 +333,8 @@ def compile_scene(
     """Compile the C++ text of a scene to a shared library, or find it compiled already.
 
     `libraries` are folders of headers that others maintain: a version is what distinguishes them.
-    `links` are options that name what to link with, `extra_flags` come after the usual ones.
+    `links` are options that name what to link with; `extra_flags` come after the usual ones, and
+    those in $HAMOTOR_CXXFLAGS after these.
     `scalar` is what the scene calculates with.
 
     `on_compile` is called before the compiler starts, and not where it need not.
@@ -345,7 +346,8 @@ def compile_scene(
     cache = default_cache() if cache is None else cache
     requirement = requirement_of(scalar, platform.machine())
     compiler = find_compiler(cache, requirement)
-    flags = (*flags_for(platform.machine()), *extra_flags)
+    chosen = shlex.split(os.environ.get("HAMOTOR_CXXFLAGS", ""))
+    flags = (*flags_for(platform.machine()), *extra_flags, *chosen)
     links = (*links, *(() if requirement is None else requirement.links))
     key = hashlib.sha256(
         json.dumps(
