@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from tests.bench.precision import peers, stopwatch
 
-from hamotor.bench import endpoint, precision, solvers
+from hamotor.bench import endpoint, precision, readme, solvers
 from hamotor.bench.contest import Extent
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
@@ -190,6 +190,33 @@ for index in range(3):
     assert "timed out" in answers[0, 1]["failure"]
     assert answers[1, 0]["failure"].endswith("ended with -6")
     assert all("final" in answers[at] for at in ((0, 0), (2, 0), (2, 1)))
+
+
+def test_the_readme_says_what_the_account_does() -> None:
+    def ladder(problem: str, who: str, family: str, microseconds: float) -> list[dict[str, Any]]:
+        rows = _rows([1e-5] * 3, [microseconds] * 3)
+        return [{**row, "problem": problem, "contestant": who, "family": family} for row in rows]
+
+    rows = []
+    for name in readme.SHOWN:
+        rows += ladder(name, "taylor", "hamotor", 10.0)
+        rows += ladder(name, "splitting4", "hamotor", 80.0)
+        rows += ladder(name, "gauss6", "hamotor", 30.0)
+        rows += ladder(name, "heyoka", "heyoka", 20.0)
+    rows += ladder("P1", "closed_form", "hamotor", 2.0)
+    said = {"norm": ATTITUDE, "end_s": 5.0}
+    account = {
+        "targets": [1e-4, 1e-6],
+        "problems": dict.fromkeys(readme.SHOWN, said),
+        "rows": rows,
+        "provenance": {"processor": "one"},
+    }
+    text = readme.text(account)
+    assert "| spring, 5 s | 10 / 20 | none / none |" in text
+    assert "| free, 5 s | 2 / 20 | none / none |" in text
+    assert "Without the closed form the free body takes us 0.5 times as long" in text
+    assert "splittings take 4 times as long as the fastest public solver" in text
+    assert "Gauss collocation takes 3 to 15 times as long as the fastest of ours" in text
 
 
 def test_over_problems_the_worst_is_named() -> None:

@@ -304,7 +304,7 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
         ladder[0]["contestant"] for ladder in ladders.values() if ladder[0]["family"] != "hamotor"
     ):
         if who not in arrived:
-            ax.plot([], [], linestyle="", label=f"{who}: not within {_COARSEST:g}")
+            ax.errorbar([], [], linestyle="", label=f"{who}: not within {_COARSEST:g}")
     for target in account["targets"]:
         ax.axhline(target, color="#eeeeee", linewidth=0.8, zorder=0)
     ax.set_xscale("log")

@@ -64,9 +64,14 @@ class Times:
                 yield time / other
 
 
+def brief(number: float, digits: int) -> str:
+    """`1400`, `2.1`: without an exponent."""
+    return f"{float(f'{number:.{digits}g}'):,g}"
+
+
 def in_words(ratios: Sequence[float]) -> str:
     """`2.1 to 5.6`, or one figure where they are the same."""
-    low, high = (f"{x:.2g}" for x in (min(ratios), max(ratios)))
+    low, high = (brief(x, 2) for x in (min(ratios), max(ratios)))
     return low if low == high else f"{low} to {high}"
 
 
@@ -82,7 +87,7 @@ def table(account: Mapping[str, Any]) -> list[str]:
         cells = []
         for target in targets:
             ours, peer = times.best_of_ours(target), times.best_peer(target)
-            cells.append(" / ".join("none" if t is None else f"{t:.3g}" for t in (ours, peer)))
+            cells.append(" / ".join("none" if t is None else brief(t, 3) for t in (ours, peer)))
         end = account["problems"][name]["end_s"]
         lines.append(f"| {word}, {end:g} s | " + " | ".join(cells) + " |")
     return lines
@@ -115,23 +120,19 @@ def reading(account: Mapping[str, Any]) -> list[str]:
         said.append(
             f"Gauss collocation takes {in_words(gauss)} times as long as the fastest of ours."
         )
-    slow = [
-        f"{who} {in_words(found)}"
+    slow = {
+        who: [
+            time / ours
+            for target, time in spring.peers.get(who, {}).items()
+            if (ours := spring.best_of_ours(target)) is not None
+        ]
         for who in ("SciPy DOP853", "MuJoCo RK4", "Pinocchio RK4")
-        if (
-            found := [
-                time / ours
-                for times in of.values()
-                for target, time in times.peers.get(who, {}).items()
-                if (ours := times.best_of_ours(target)) is not None
-            ]
-        )
-    ]
-    if slow:
+    }
+    if any(slow.values()):
         said.append(
-            "Called from Python or made for contacts: "
-            + ", ".join(slow)
-            + " times as long as ours."
+            "What is called from Python or made for contacts takes longer on it: "
+            + ", ".join(f"{who} {in_words(found)} times" for who, found in slow.items() if found)
+            + " the time of ours."
         )
     return said
 

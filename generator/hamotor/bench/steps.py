@@ -8,7 +8,6 @@ interleaved, and a time is the median of them. The error is the distance at the 
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
@@ -16,10 +15,11 @@ from pathlib import Path
 from statistics import geometric_mean, median
 from typing import Any, Final
 
-from hamotor.bench.account import provenance, publish
+from hamotor.bench.account import provenance, publish, say, write_whole
 from hamotor.errors import UsageError
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.comparison import compare
+from hamotor.run.report import to_json
 from hamotor.run.result import Run
 from hamotor.run.simulation import Simulation, load
 
@@ -72,27 +72,32 @@ def bench_steps(
 ) -> dict[str, Any]:
     """Run and account for the benchmark of steps.
 
-    scenes: names or paths; one for each group if not given.  out: where steps.json goes; None:
-    nowhere.  json: print the account on stdout instead of the table.  quick: three repetitions
-    instead of nine, of a tenth of the steps, and one method a family.  Returns the account.
+    scenes: names or paths; one for each group if not given.  out: where steps.json goes, written
+    after each scene; None: nowhere.  json: print the account on stdout instead of the table.
+    quick: three repetitions instead of nine, of a tenth of the steps, and one method a family.
+    Returns the account.
     Raises UsageError and ToolError as `hamotor run` does.
     """
     rows: list[Row] = []
+    about = provenance(
+        compiler=find_compiler(default_cache()).version,
+        flags=" ".join(flags_for(os.uname().machine)),
+    )
     for scene in scenes or SCENES:
-        print(f"stepping {scene}", file=sys.stderr, flush=True)
+        say(f"stepping {scene}")
         rows += _rows(load(scene), quick=quick)
-    account = {
-        "benchmark": "steps",
-        "quick": quick,
-        "unit": "ns per step, median of the repetitions",
-        "error": "distance at the end from a run in long double with shorter steps",
-        "rows": [asdict(row) for row in rows],
-        "families": [asdict(family) for family in families(rows)],
-        "provenance": provenance(
-            compiler=find_compiler(default_cache()).version,
-            flags=" ".join(flags_for(os.uname().machine)),
-        ),
-    }
+        account = {
+            "benchmark": "steps",
+            "quick": quick,
+            "unit": "ns per step, median of the repetitions",
+            "error": "distance at the end from a run in long double with shorter steps",
+            "rows": [asdict(row) for row in rows],
+            "families": [asdict(family) for family in families(rows)],
+            "provenance": about,
+        }
+        if out is not None:
+            out.mkdir(parents=True, exist_ok=True)
+            write_whole(out / "steps.json", to_json(account))
     publish(account, table, out=out, as_json=json)
     return account
 
