@@ -105,10 +105,21 @@ double flops() {
   for (std::size_t k = 0; k < mu.size(); ++k) mu[k] = start.momenta[0].components()[k];
   state.momenta[0] = std::remove_cvref_t<decltype(state.momenta[0])>::from(mu);
   Method<System> method;
-  method.do_step(system, state, S(0), S(step));
+  const auto take = [&](int many) {
+    for (int k = 0; k < many; ++k) {
+      if constexpr (hamotor::stays_open<Method<System>>) {
+        for (std::size_t turn = 0; turn < Method<System>::turns; ++turn) {
+          method.template do_turn<true>(system, state, S(step), turn);
+        }
+      } else {
+        method.do_step(system, state, S(0), S(step));
+      }
+    }
+  };
+  take(1);
   hamotor::Counted::counts.fill(0);
-  constexpr int steps = 10;
-  for (int k = 0; k < steps; ++k) method.do_step(system, state, S(0), S(step));
+  constexpr int steps = 16;  // after so many, open steps put their motors back
+  take(steps);
   const auto& counts = hamotor::Counted::counts;
   return static_cast<double>(counts[S::additions] + counts[S::products]) / steps;
 }

@@ -127,6 +127,60 @@ TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
   expect_bits_of_a_run<Splitting2>(sample::forced_so3<Pack<double, 4>>());
 }
 
+template <class System>
+using Open2 = hamotor::Splitting2<System, hamotor::Summation::plain>;
+template <class System>
+using Open4 = hamotor::Splitting4<System, hamotor::Summation::plain>;
+
+TEST(Ensembles, steps_left_open_are_those_of_a_run_but_for_rounding) {
+  const auto system = sample::free_se3();
+  using System = std::remove_const_t<decltype(system)>;
+  const auto lanes = sample::free_se3<Pack<double, 4>>();
+  const auto members = members_of(system, count, 50);
+  Ensemble ensemble(lanes, Open4<std::remove_const_t<decltype(lanes)>>{}, 0.0, step,
+                    std::span(members));
+  const auto expect_near_a_run = [&](int steps_done) {
+    for (std::size_t k = 0; k < count; k += 5) {
+      auto expected = members[k];
+      Open4<System> method;
+      for (int n = 0; n < steps_done; ++n) method.do_step(system, expected, 0.0, step);
+      const auto found = ensemble.state(k);
+      const double size = 1 + std::abs(found.motors[0].e01) + std::abs(found.momenta[0].l12);
+      for (std::size_t c = 0; c < 8; ++c) {
+        EXPECT_NEAR(found.motors[0].components()[c], expected.motors[0].components()[c],
+                    1e-12 * size);
+      }
+      for (std::size_t c = 0; c < 6; ++c) {
+        EXPECT_NEAR(found.momenta[0].components()[c], expected.momenta[0].components()[c],
+                    1e-12 * size);
+      }
+    }
+  };
+  expect_near_a_run(0);
+  ensemble.advance(1);
+  expect_near_a_run(1);
+  ensemble.advance(steps - 1);
+  expect_near_a_run(steps);
+}
+
+TEST(Ensembles, steps_left_open_do_not_depend_on_lanes_or_on_when_they_are_looked_at) {
+  const auto members = members_of(sample::free_so3(), count, 1e3);
+  const auto alone = hash_in<Open2>(sample::free_so3<Pack<double, 1>>(), members, 1, count);
+  const auto eight = sample::free_so3<Pack<double, 8>>();
+  EXPECT_EQ(hash_in<Open2>(eight, members, 2, 3), alone);
+  Ensemble ensemble(eight, Open2<std::remove_const_t<decltype(eight)>>{}, 0.0, step,
+                    std::span(members));
+  Hash hash;
+  for (int n = 0; n < steps; ++n) {
+    ensemble.advance(1);
+    if (n % 9 == 0) {
+      EXPECT_TRUE(std::isfinite(ensemble.state(7).motors[0].s));
+    }
+  }
+  for (std::size_t k = 0; k < count; ++k) hash.add(ensemble.state(k));
+  EXPECT_EQ(hash.value(), alone);
+}
+
 TEST(Ensembles, a_member_that_fails_keeps_its_last_state_and_the_others_go_on) {
   const auto system = sample::forced_so3<Pack<double, 8>>();
   auto members = members_of(sample::forced_so3(), count);

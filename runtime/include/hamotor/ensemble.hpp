@@ -92,6 +92,13 @@ struct OneForEach {
   }
 };
 
+/// Whether a method's steps can be left open, and its states be closed when they are asked for.
+template <class Method>
+inline constexpr bool stays_open = false;
+template <class Method>
+  requires requires { Method::stays_open; }
+inline constexpr bool stays_open<Method> = Method::stays_open;
+
 /// Members of a system under way.
 ///
 /// `Systems` gives the system of a block, in which each lane may have parameters of its own.  With
@@ -124,6 +131,12 @@ class Ensemble {
       detail::merge(block.state, members[std::min(k, members.size() - 1)],
                     [&](Scalar& to, const Number& from) { detail::set_lane(to, k % lanes, from); });
     }
+    if constexpr (stays_open<Method>) {
+      for (std::size_t k = 0; k < bundles_.size() * in_turn; ++k) {
+        Block& block = bundles_[k / in_turn][k % in_turn];
+        block.method.open(systems_(k), block.state, Scalar(step_));
+      }
+    }
   }
 
   /// Every member that is alive takes so many steps; how many still are.
@@ -153,7 +166,12 @@ class Ensemble {
   /// The state of a member: the last good one where it failed.
   [[nodiscard]] Member state(std::size_t member) const noexcept {
     Member result{};
-    detail::merge(result, block_of(member).state, [&](Number& to, const Scalar& from) {
+    auto state = block_of(member).state;
+    if constexpr (stays_open<Method>) {
+      state = block_of(member).method.closed(systems_(member / lanes), state, Scalar(step_),
+                                             Scalar(static_cast<Number>(steps(member))));
+    }
+    detail::merge(result, state, [&](Number& to, const Scalar& from) {
       to = detail::lane_of(from, member % lanes);
     });
     return result;
@@ -188,8 +206,9 @@ class Ensemble {
   }
 
  private:
-  /// Blocks that are stepped in turn: a step's operations wait for each other.
-  static constexpr std::size_t in_turn = is_pack<Scalar> ? 2 : 1;
+  /// Blocks that are stepped in turn: a step's operations wait for each other, those of an open
+  /// step for twice as long as there are any.
+  static constexpr std::size_t in_turn = !is_pack<Scalar> ? 1 : stays_open<Method> ? 4 : 2;
   static constexpr std::size_t in_bundle = in_turn * lanes;
   /// Steps between looks whether all numbers are finite; a bundle in which one is not takes them
   /// again one by one.
@@ -250,9 +269,22 @@ class Ensemble {
     [&]<std::size_t... g>(std::index_sequence<g...>) {
       const std::array<System, in_turn> systems{systems_(bundle * in_turn + g)...};
       const Scalar h(step_);
-      for (std::int64_t k = 0; k < steps; ++k) {
-        const Scalar t = now(index + k);
-        (blocks[g].method.do_step(systems[g], blocks[g].state, t, h), ...);
+      if constexpr (stays_open<Method>) {
+        const auto take = [&]<bool is_small>(std::bool_constant<is_small>) {
+          for (std::int64_t k = 0; k < steps; ++k) {
+            for (std::size_t turn = 0; turn < Method::turns; ++turn) {
+              (blocks[g].method.template do_turn<is_small>(systems[g], blocks[g].state, h, turn),
+               ...);
+            }
+          }
+        };
+        const bool small = (Method::turns_stay_small(systems[g], blocks[g].state, h) && ...);
+        small ? take(std::true_type{}) : take(std::false_type{});
+      } else {
+        for (std::int64_t k = 0; k < steps; ++k) {
+          const Scalar t = now(index + k);
+          (blocks[g].method.do_step(systems[g], blocks[g].state, t, h), ...);
+        }
       }
     }(std::make_index_sequence<in_turn>{});
   }

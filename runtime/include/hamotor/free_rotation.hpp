@@ -122,6 +122,13 @@ template <class S, std::size_t D>
   return sum;
 }
 
+template <class S>
+[[nodiscard]] constexpr std::array<S, 3> cross(const std::array<S, 3>& a,
+                                               const std::array<S, 3>& b) noexcept {
+  return {mul_add(a[1], b[2], -a[2] * b[1]), mul_add(a[2], b[0], -a[0] * b[2]),
+          mul_add(a[0], b[1], -a[1] * b[0])};
+}
+
 /// What a free rotation does: M ↦ M q, and what it adds to Π.
 template <class S, std::size_t R>
 struct Turning {
@@ -155,6 +162,38 @@ HAMOTOR_INLINE constexpr void turn_about_axis(const AngleIncrement<S>& half,
   q.sines[K] = v[K] + mul_add(a, v[K], mul_add(b, s, b));
   q.sines[i] = v[i] + mul_add(a, v[i], b * v[j]);
   q.sines[j] = v[j] + mul_add(a, v[j], -b * v[i]);
+}
+
+/// x cos θ + y sin θ and y cos θ − x sin θ of the components x and y.
+template <class S, std::size_t N>
+HAMOTOR_INLINE constexpr void turn_plane(std::array<S, N>& v, std::size_t x, std::size_t y,
+                                         const AngleIncrement<S>& by) noexcept {
+  const S before = v[x];
+  v[x] = mul_add(by.sine, v[y], mul_add(by.cosine_less_one, before, before));
+  v[y] = mul_add(-by.sine, before, mul_add(by.cosine_less_one, v[y], v[y]));
+}
+
+/// Turns a body in space about its axis E_K, given half the angle: M ↦ M q, and Π and P back.
+template <std::size_t K, class Element, class Momentum, class S>
+HAMOTOR_INLINE constexpr void turn_body(Element& motor, Momentum& momentum,
+                                        const AngleIncrement<S>& half) noexcept {
+  constexpr std::size_t i = (K + 1) % 3;
+  constexpr std::size_t j = (K + 2) % 3;
+  // s, e23, e31, e12 and, where there are translations, e01, e02, e03, e0123.
+  auto m = motor.components();
+  turn_plane(m, 0, 1 + K, half);
+  turn_plane(m, 1 + i, 1 + j, half);
+  if constexpr (m.size() == 8) {
+    turn_plane(m, 4 + K, 7, half);
+    turn_plane(m, 4 + i, 4 + j, half);
+  }
+  motor = Element::from(m);
+  const AngleIncrement<S> whole = half.twice();
+  auto mu = momentum.components();
+  for (std::size_t first = 0; first < mu.size(); first += 3) {
+    turn_plane(mu, first + i, first + j, whole);
+  }
+  momentum = Momentum::from(mu);
 }
 
 /// q r − 1.
@@ -275,6 +314,33 @@ class PrincipalRotation {
     Angular turned = pi;
     turn<outer>(S(0.5) * h * outer_, pi, turned, change);
     return change;
+  }
+
+  /// Half the turn about o, or about i, in the time h; `is_small` where it is known to be.
+  template <bool is_outer, bool is_small>
+  [[nodiscard]] HAMOTOR_INLINE constexpr AngleIncrement<S> half_turn(const Angular& pi,
+                                                                     const S& h) const noexcept
+    requires(R == 3)
+  {
+    const S x = S(0.5) * h * (is_outer ? outer_ : inner_) * pi[is_outer ? outer : inner];
+    if constexpr (is_small) {
+      return AngleIncrement<S>::of_small(x);
+    } else {
+      return AngleIncrement<S>::of(x);
+    }
+  }
+
+  /// Whether every half turn in the time h is small and remains so: |Π| is constant but for
+  /// rounding, for which there is room.
+  [[nodiscard]] constexpr bool turns_stay_small(const Angular& pi, const S& h) const noexcept
+    requires(R == 3)
+  {
+    if constexpr (detail::has_series<S>) {
+      const S rate = S(0.5) * h * scalar::max_abs(outer_, inner_);
+      return all(rate * rate * detail::dot(pi, pi) <= S(0.99) * detail::series_bound<S>);
+    } else {
+      return false;
+    }
   }
 
   /// q − 1 for the motion of a ball of moments J_c: the rotation about Π itself, which leaves Π as

@@ -9,6 +9,7 @@
 #include <concepts>
 #include <cstddef>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
 
 #include "hamotor/scalar.hpp"
@@ -41,9 +42,7 @@ constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
 /// Largest absolute coefficient of M M~ − 1.
 template <class Defect>
 [[nodiscard]] constexpr typename Defect::Scalar size(const Defect& defect) noexcept {
-  typename Defect::Scalar worst(0);
-  for (const auto& x : defect.components()) worst = scalar::max_abs(worst, x);
-  return worst;
+  return std::apply([](const auto&... x) { return scalar::max_abs(x...); }, defect.components());
 }
 
 /// M M~ − 1, rounded as its terms are: for steppers that round M itself in every step.  Products by
@@ -69,6 +68,14 @@ constexpr void record(Drift<S>& drift, const S& defect) noexcept {
   drift.sum = drift.sum + defect;
 }
 
+/// The largest of all bodies' defects.
+template <class S, std::size_t N>
+constexpr void record(Drift<S>& drift, const std::array<S, N>& defects) noexcept {
+  S worst = defects[0];
+  for (std::size_t i = 1; i < N; ++i) worst = select(worst > defects[i], worst, defects[i]);
+  record(drift, worst);
+}
+
 /// The series of dexp⁻¹ for M = M₀ exp X, Ṁ = M B: Ẋ = B + ½ [X, B] + 1/12 [X, [X, B]] − …, whose
 /// next term is of fourth order in X.
 template <class Rate, class S>
@@ -90,6 +97,13 @@ inline constexpr bool takes_split_steps = false;
 template <class System>
   requires requires { System::takes_split_steps; }
 inline constexpr bool takes_split_steps<System> = System::takes_split_steps;
+
+/// Whether all of a system's motion is turns about two axes, and what commutes with them.
+template <class System>
+inline constexpr bool has_two_turns = false;
+template <class System>
+  requires requires { System::has_two_turns; }
+inline constexpr bool has_two_turns<System> = System::has_two_turns;
 
 /// The scheme of a splitting; a free motion that is exact needs none where nothing acts.
 ///
@@ -172,7 +186,7 @@ class Rkmk4 {
     const Slope three = slope_at(system, state, t, half_step, two);
     const Slope four = slope_at(system, state, t, h, three);
 
-    S worst(0);
+    std::array<S, n> defects{};
     for (std::size_t i = 0; i < n; ++i) {
       const Rate x =
           (h / S(6)) * mul_add(S(2), two.rate[i] + three.rate[i], one.rate[i] + four.rate[i]);
@@ -181,7 +195,7 @@ class Rkmk4 {
       auto& motor = state.motors[i];
       motor = gp(motor, exp(x));
       const auto defect = unit_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
+      defects[i] = detail::size(defect);
       motor = motor + unit_correction(motor, defect);
       state.momenta[i] = mul_add(h / S(6), force, state.momenta[i]);
     }
@@ -189,7 +203,7 @@ class Rkmk4 {
       work_ =
           mul_add(h / S(6), mul_add(S(2), two.power + three.power, one.power + four.power), work_);
     }
-    detail::record(drift_, worst);
+    detail::record(drift_, defects);
   }
 
   /// How far the steps so far left the group.
@@ -268,13 +282,13 @@ class Rk4 {
     const Slope three = slope(system, moved(state, half_step, two), t + half_step);
     const Slope four = slope(system, moved(state, h, three), t + h);
 
-    S worst(0);
+    std::array<S, n> defects{};
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = state.motors[i];
       motor = mul_add(h / S(6), mean(one.motors[i], two.motors[i], three.motors[i], four.motors[i]),
                       motor);
       const auto defect = detail::rounded_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
+      defects[i] = detail::size(defect);
       motor = motor + unit_correction(motor, defect);
       state.momenta[i] =
           mul_add(h / S(6), mean(one.force[i], two.force[i], three.force[i], four.force[i]),
@@ -283,7 +297,7 @@ class Rk4 {
     if constexpr (PoweredSystem<System>) {
       work_ = mul_add(h / S(6), mean(one.power, two.power, three.power, four.power), work_);
     }
-    detail::record(drift_, worst);
+    detail::record(drift_, defects);
   }
 
   /// How far the steps so far left the group.
@@ -361,6 +375,11 @@ class Splitting {
   static constexpr std::string_view name = detail::splitting_name(nominal_order);
   /// Free motions in a step.
   static constexpr std::size_t stages = Scheme::stages;
+  /// Whether steps can be left open: the turn that ends one and the turn that begins the next are
+  /// made as one, and what commutes with all turns once, when the state is asked for.
+  static constexpr bool stays_open = summation == Summation::plain && detail::has_two_turns<System>;
+  /// Turns in an open step.
+  static constexpr std::size_t turns = 2 * stages;
 
   /// Takes `state` from t to t + h.
   [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state,
@@ -418,6 +437,61 @@ class Splitting {
     }
   }
 
+  /// From a state to one inside the first step, to be taken further by open steps of h.
+  constexpr void open(const System& system, StateOf<System>& state, const S& h) const noexcept
+    requires(stays_open)
+  {
+    system.template turn<true, false>(state.motors, state.momenta, weights.kicks[0] * h);
+  }
+
+  /// Whether all turns of steps of h are small, from this state on: |Π| is constant but for
+  /// rounding, for which there is room.
+  [[nodiscard]] static constexpr bool turns_stay_small(const System& system,
+                                                       const StateOf<System>& state,
+                                                       const S& h) noexcept
+    requires(stays_open)
+  {
+    S largest = weights.kicks[stages] + weights.kicks[0];
+    for (const S& weight : weights.drifts) largest = scalar::max_abs(largest, weight);
+    for (const S& weight : weights.kicks) largest = scalar::max_abs(largest, weight);
+    return system.turns_stay_small(state.momenta, largest * h);
+  }
+
+  /// Takes an open state through one of the `turns` of a step of h, which are taken in this order.
+  /// They leave the group by rounding only, so that motors are put back every 16 steps.
+  template <bool is_small>
+  [[gnu::flatten]] HAMOTOR_INLINE constexpr void do_turn(const System& system,
+                                                         StateOf<System>& state, const S& h,
+                                                         std::size_t number) noexcept
+    requires(stays_open)
+  {
+    const std::size_t stage = stages == 1 ? 0 : number / 2;  // a constant, where it is one
+    if (number % 2 == 0) {
+      system.template turn<false, is_small>(state.motors, state.momenta, weights.drifts[stage] * h);
+      return;
+    }
+    const bool last = stage + 1 == stages;
+    const S weight = last ? weights.kicks[stages] + weights.kicks[0] : weights.kicks[stage + 1];
+    system.template turn<true, is_small>(state.motors, state.momenta, weight * h);
+    if (!last) return;
+    open_steps_ = (open_steps_ + 1) % 16;
+    if (open_steps_ == 0) put_back(state);
+  }
+
+  /// The state after so many open steps of h.
+  [[nodiscard]] constexpr StateOf<System> closed(const System& system, StateOf<System> state,
+                                                 const S& h, const S& steps) const noexcept
+    requires(stays_open)
+  {
+    system.template turn<true, false>(state.motors, state.momenta, -weights.kicks[0] * h);
+    const auto change = system.commuting_change(state.motors, state.momenta, steps * h);
+    for (std::size_t i = 0; i < n; ++i) {
+      state.motors[i] = state.motors[i] + change.motors[i];
+      state.momenta[i] = state.momenta[i] + change.momenta[i];
+    }
+    return state;
+  }
+
   /// How far the steps so far left the group.
   [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
 
@@ -454,7 +528,7 @@ class Splitting {
   /// What was lacking before the step is lacking after it, as (M q)(M q)~ = M M~.  Found before, it
   /// waits for none of the step's parts and none of the next step's for it.
   constexpr void add(StateOf<System>& state, const ChangeOf<System>& change) noexcept {
-    S worst(0);
+    std::array<S, n> defects{};
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = state.motors[i];
       auto& momentum = state.momenta[i];
@@ -465,21 +539,33 @@ class Splitting {
         const auto correction = unit_correction(motor + change.motors[i], defect);
         detail::add_compensated(motor, low, change.motors[i] + correction);
         detail::add_compensated(momentum, low_.momenta[i], change.momenta[i]);
-        worst = scalar::max_abs(worst, detail::size(defect));
+        defects[i] = detail::size(defect);
       } else {
         const auto defect = detail::rounded_defect(motor);
         motor = motor + change.motors[i];
         motor = motor + unit_correction(motor, defect);
         momentum = momentum + change.momenta[i];
-        worst = scalar::max_abs(worst, detail::size(defect));
+        defects[i] = detail::size(defect);
       }
     }
-    detail::record(drift_, worst);
+    detail::record(drift_, defects);
+  }
+
+  constexpr void put_back(StateOf<System>& state) noexcept {
+    std::array<S, n> defects{};
+    for (std::size_t i = 0; i < n; ++i) {
+      auto& motor = state.motors[i];
+      const auto defect = detail::rounded_defect(motor);
+      motor = motor + unit_correction(motor, defect);
+      defects[i] = detail::size(defect);
+    }
+    detail::record(drift_, defects);
   }
 
   [[no_unique_address]] std::conditional_t<System::has_forque, KnownForque, Nothing> known_;
   [[no_unique_address]] std::conditional_t<compensated, LowDigits, Nothing> low_;
   Drift<S> drift_;
+  unsigned open_steps_ = 0;
 };
 
 template <SplitSystem System, Summation summation = Summation::compensated>

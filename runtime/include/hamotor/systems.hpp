@@ -43,6 +43,8 @@ class FreeBody {
   static constexpr std::size_t dimension = Space<G>::dimension;
   static constexpr bool spin_apart = split.spin_apart;
   static constexpr bool nearly_symmetric = split.nearly_symmetric;
+  /// Whether the free rotation is composed of turns about two axes.
+  static constexpr bool has_two_turns = !free_motion_is_exact;
   static_assert(Space<G>::translates, "a body of a group of rotations is a PivotedBody");
 
   constexpr FreeBody(const S& mass, const std::array<S, rotations>& moments) noexcept
@@ -65,8 +67,15 @@ class FreeBody {
   /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out: in orbit it
   /// is the difference of products that are larger than any torque by all digits.
   [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
-    const auto turning = detail::first<rotations>(rate(mu).components());
-    return coadjoint(Rate::from(detail::joined(turning, std::array<S, dimension>{})), mu);
+    const auto x = mu.components();
+    const auto pi = detail::first<rotations>(x);
+    const auto turning = rotation_.rate(pi);
+    const auto p = detail::rest<rotations>(x);
+    if constexpr (rotations == 3) {
+      return Momentum::from(detail::joined(detail::cross(pi, turning), detail::cross(p, turning)));
+    } else {
+      return Momentum::from({S(0), p[1] * turning[0], -p[0] * turning[0]});
+    }
   }
 
   /// ½ μ(B), J.
@@ -100,6 +109,34 @@ class FreeBody {
       const SplittingWeights<S, stages>& weights) const noexcept {
     return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
                  rotation_.free_step(detail::first<rotations>(mu.components()), h, weights));
+  }
+
+  /// A part of the free motion: the turn about the axis o, or about i, in the time h; `is_small`
+  /// where it is known to be.
+  template <bool is_outer, bool is_small>
+  HAMOTOR_INLINE constexpr void turn(Element& m, Momentum& mu, const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    constexpr auto axis = static_cast<std::size_t>(is_outer ? split.outer : split.inner);
+    detail::turn_body<axis>(m, mu,
+                            rotation_.template half_turn<is_outer, is_small>(
+                                detail::first<rotations>(mu.components()), h));
+  }
+
+  /// Whether those turns are small and remain so.
+  [[nodiscard]] constexpr bool turns_stay_small(const Momentum& mu, const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    return rotation_.turns_stay_small(detail::first<rotations>(mu.components()), h);
+  }
+
+  /// What else the free motion adds in the time h: it commutes with those turns, and is exact.
+  [[nodiscard]] constexpr BodyChange<G, S> commuting_change(const Element& m, const Momentum& mu,
+                                                            const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
+                 {rotation_.spherical_change(detail::first<rotations>(mu.components()), h), {}});
   }
 
   /// Where a point of the principal frame is in the world, m.
@@ -177,6 +214,8 @@ class PivotedBody {
   static constexpr std::size_t dimension = Space<G>::dimension;
   static constexpr bool spin_apart = split.spin_apart;
   static constexpr bool nearly_symmetric = split.nearly_symmetric;
+  /// Whether the free rotation is composed of turns about two axes.
+  static constexpr bool has_two_turns = !free_motion_is_exact;
   static_assert(!Space<G>::translates, "a body of a group that translates is a FreeBody");
 
   constexpr PivotedBody(const S& mass, const std::array<S, rotations>& moments,
@@ -231,6 +270,33 @@ class PivotedBody {
       const Element& m, const Momentum& mu, const S& h,
       const SplittingWeights<S, stages>& weights) const noexcept {
     return turned(m, rotation_.free_step(mu.components(), h, weights));
+  }
+
+  /// A part of the free motion: the turn about the axis o, or about i, in the time h; `is_small`
+  /// where it is known to be.
+  template <bool is_outer, bool is_small>
+  HAMOTOR_INLINE constexpr void turn(Element& m, Momentum& mu, const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    constexpr auto axis = static_cast<std::size_t>(is_outer ? split.outer : split.inner);
+    detail::turn_body<axis>(m, mu,
+                            rotation_.template half_turn<is_outer, is_small>(
+                                detail::first<rotations>(mu.components()), h));
+  }
+
+  /// Whether those turns are small and remain so.
+  [[nodiscard]] constexpr bool turns_stay_small(const Momentum& mu, const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    return rotation_.turns_stay_small(detail::first<rotations>(mu.components()), h);
+  }
+
+  /// What else the free motion adds in the time h: it commutes with those turns, and is exact.
+  [[nodiscard]] constexpr BodyChange<G, S> commuting_change(const Element& m, const Momentum& mu,
+                                                            const S& h) const noexcept
+    requires(has_two_turns)
+  {
+    return turned(m, {rotation_.spherical_change(mu.components(), h), {}});
   }
 
   /// The motion in the field g (world frame, m/s²) in the time h, by a splitting, of a body whose
@@ -317,14 +383,14 @@ enum class RestLength { zero, positive };
 
 namespace detail {
 
-/// k (1 − ℓ/r), the force over the extension r.
-template <RestLength rest, class S>
+/// k (1 − ℓ/r), the force over the extension r between the ends.
+template <RestLength rest, class S, std::size_t D>
 [[nodiscard]] constexpr S tension(const S& stiffness, const S& rest_length,
-                                  const S& length_squared) noexcept {
+                                  const std::array<S, D>& extension) noexcept {
   if constexpr (rest == RestLength::zero) {
     return stiffness;
   } else {
-    const S length = scalar::sqrt(length_squared);
+    const S length = scalar::sqrt(dot(extension, extension));
     return select(length > S(0), stiffness - stiffness * (rest_length / length), S(0));
   }
 }
@@ -371,7 +437,7 @@ struct SpringToWorld {
                             Momenta& forque) const noexcept {
     const auto end = system.template body<index>().in_body(motors[index], anchor);
     const auto d = detail::difference(at, end);
-    const S pull = detail::tension<rest>(stiffness, rest_length, detail::dot(d, d));
+    const S pull = detail::tension<rest>(stiffness, rest_length, d);
     forque[index] = mul_add(-pull, Space<G>::wrench(regressive(at, end)), forque[index]);
   }
 };
@@ -398,7 +464,7 @@ struct SpringBetween {
                             Momenta& forque) const noexcept {
     using Direction = typename Space<G>::template Direction<S>;
     auto f = extension(system, motors);
-    const S pull = detail::tension<rest>(stiffness, rest_length, detail::dot(f, f));
+    const S pull = detail::tension<rest>(stiffness, rest_length, f);
     for (auto& x : f) x = pull * x;
     const Direction force = Direction::from(f);
     forque[one] =
@@ -451,6 +517,8 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   /// Whether the system takes whole steps of a splitting by itself.
   static constexpr bool is_top = detail::is_top<std::tuple<Body...>, std::tuple<Interaction...>>;
   static constexpr bool takes_split_steps = !has_forque || is_top;
+  /// Whether all that moves is bodies whose free rotations are composed of turns about two axes.
+  static constexpr bool has_two_turns = !has_forque && (Body::has_two_turns && ...);
   using Motors = std::array<typename Group::template Element<Scalar>, bodies>;
   using Momenta = std::array<typename Group::template Momentum<Scalar>, bodies>;
   using Rates = std::array<typename Group::template Rate<Scalar>, bodies>;
@@ -547,6 +615,38 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
         return BodyChange<Group, Scalar>{};
       }
     });
+  }
+
+  /// The turn of every body about its axis o, or i, in the time h.
+  template <bool is_outer, bool is_small>
+  HAMOTOR_INLINE constexpr void turn(Motors& motors, Momenta& momenta,
+                                     const Scalar& h) const noexcept
+    requires(has_two_turns)
+  {
+    for_each_body([&](auto i, const auto& one) {
+      one.template turn<is_outer, is_small>(motors[i], momenta[i], h);
+    });
+  }
+
+  /// Whether all those turns are small and remain so.
+  [[nodiscard]] constexpr bool turns_stay_small(const Momenta& momenta,
+                                                const Scalar& h) const noexcept
+    requires(has_two_turns)
+  {
+    bool small = true;
+    for_each_body(
+        [&](auto i, const auto& one) { small = small && one.turns_stay_small(momenta[i], h); });
+    return small;
+  }
+
+  /// What all that commutes with those turns adds in the time h.
+  [[nodiscard]] constexpr ChangeOf<RigidBodies> commuting_change(const Motors& motors,
+                                                                 const Momenta& momenta,
+                                                                 const Scalar& h) const noexcept
+    requires(has_two_turns)
+  {
+    return for_bodies(
+        [&](auto i, const auto& one) { return one.commuting_change(motors[i], momenta[i], h); });
   }
 
   /// What a whole step of a splitting adds.
