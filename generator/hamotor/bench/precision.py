@@ -276,7 +276,7 @@ def _long_runs(
     simulation = one.simulation
     step = step_of(simulation)
     longest_s = _longest_s(steps)
-    asked = solvers.long_runs(contestants, compiler, step, steps, SAMPLES, longest_s)
+    asked = solvers.long_runs(contestants, compiler, step, steps, SAMPLES, longest_s / 2)
     first, *_ = ours
     of = Conserved(one, SceneLibrary(Path(first.said["library"])), first.name)
     found: list[Drift] = []

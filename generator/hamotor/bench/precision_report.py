@@ -43,8 +43,9 @@ Scalars wider than a double start from doubles and are read in doubles here: the
 not more digits.
 Long runs take the scene's step; solvers with a tolerance take 1e-14 and their own steps for the \
 same time. Relative errors of what is conserved are taken over its size at the start; the \
-attitude, where the motion has a closed form, is held against that in quad. What would take too \
-long takes fewer steps. p is the slope of log error over log steps in the last two decades.
+attitude, where the motion has a closed form, is held against that in quad. What would take \
+more than 10 s, of public solvers 5 s (for a million steps), takes fewer steps. p is the slope of \
+log error over log steps in the last two decades.
 Problems are measured one after the other; the date of each stands with its reference.
 A peer that is not installed is listed with the command that installs it; what a peer cannot \
 express is listed, too.
