@@ -90,4 +90,18 @@ struct Vectors {
   return {m.s, -m.e23, -m.e31, -m.e12};
 }
 
+/// x ↦ q x q* + t.
+template <class S>
+struct RotationAndTranslation {
+  Eigen::Quaternion<S> rotation;
+  Vector3<S> translation;
+
+  [[nodiscard]] static RotationAndTranslation of(const pga3::Motor<Quad>& m) {
+    const auto q = exact_rotation(m);
+    return {Eigen::Quaternion<S>(static_cast<S>(q.w()), static_cast<S>(q.x()),
+                                 static_cast<S>(q.y()), static_cast<S>(q.z())),
+            three<S>(sandwich(m, pga3::Origin<Quad>{}).components())};
+  }
+};
+
 }  // namespace bench

@@ -86,6 +86,28 @@ struct Isometry : Vectors<S> {
   }
 };
 
+/// The matrix of a quaternion and a translation, made anew by each operation: motions are held in
+/// as few numbers as motors, and change as often.
+template <class S>
+struct ConvertedIsometry : Vectors<S> {
+  static constexpr const char* name = "Eigen Isometry3, converted";
+  using Vectors<S>::make;
+  using Vectors<S>::exact;
+  using Motion = RotationAndTranslation<S>;
+
+  [[nodiscard]] static Motion make(kind::Motion, const pga3::Motor<Quad>& m) {
+    return Motion::of(m);
+  }
+  template <class Kind>
+  [[nodiscard]] HAMOTOR_INLINE static auto move(Kind kind, const Motion& m, const auto& x) {
+    typename Isometry<S>::Motion matrix;
+    matrix.linear() = m.rotation.toRotationMatrix();
+    matrix.translation() = m.translation;
+    matrix.makeAffine();
+    return Isometry<S>::move(kind, matrix, x);
+  }
+};
+
 /// Homogeneous matrices: points and directions are four numbers, rates are matrices too.
 template <class S>
 struct Homogeneous {
@@ -153,6 +175,10 @@ struct Homogeneous {
 
 void enter_eigen_matrix() {
   enter<Isometry>();
+  enter_for<ConvertedIsometry, operation::MovePoint>();
+  enter_for<ConvertedIsometry, operation::MoveDirection>();
+  enter_for<ConvertedIsometry, operation::MovePlane>();
+  enter_for<ConvertedIsometry, operation::MoveLine>();
   enter<Homogeneous>();
 }
 

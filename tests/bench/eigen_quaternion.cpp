@@ -3,26 +3,19 @@
 
 namespace bench {
 
-/// x ↦ q x q* + t.
 template <class S>
 struct QuaternionTranslation : Vectors<S> {
   static constexpr const char* name = "Eigen quaternion + translation";
   using Vectors<S>::make;
   using Vectors<S>::exact;
-  struct Motion {
-    Eigen::Quaternion<S> rotation;
-    Vector3<S> translation;
-  };
+  using Motion = RotationAndTranslation<S>;
   struct Moving {
     Motion motion;
     Pair<S> momentum;
   };
 
   [[nodiscard]] static Motion make(kind::Motion, const pga3::Motor<Quad>& m) {
-    const auto q = exact_rotation(m);
-    return {Eigen::Quaternion<S>(static_cast<S>(q.w()), static_cast<S>(q.x()),
-                                 static_cast<S>(q.y()), static_cast<S>(q.z())),
-            three<S>(sandwich(m, pga3::Origin<Quad>{}).components())};
+    return Motion::of(m);
   }
   [[nodiscard]] static Moving make(kind::Body, const Body<Quad>& x) {
     return {make(kind::Motion{}, x.motion), make(kind::Momentum{}, x.momentum)};

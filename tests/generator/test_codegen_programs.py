@@ -129,7 +129,7 @@ COSTS = {
     "cga3 sandwich Motor Line": (51, 39),
     "cga3 sandwich Versor Vector": (120, 100),
     "cga3 sandwich Versor Bivector": (240, 215),
-    "cga3 gp Even Even": (144, 136),
+    "cga3 gp Even Even": (136, 136),
     "cga3 commutator Bivector Bivector": (60, 50),
     "cga3 commutator Trivector Bivector": (60, 50),
     "pga3 sandwich Rotor Direction": (18, 12),
@@ -265,8 +265,12 @@ def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
     assert lines is not None
     assert sum(line.startswith("const auto sum") for line in lines) == 4
     assert "const auto four_b_e01 = lanes::load<S, 12>(b);" in lines
-    half = "four(S(0.5), S(0.5), S(-0.5), S(0.5)) * (sum1 + sum2)"
-    assert f"lanes::store<0>(result, {half});" in lines
+    both = "turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2)"
+    assert f"lanes::store<0>(result, {both});" in lines
     assert not any(line.startswith("const S ") for line in lines)
     assert any("four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i)" in line for line in lines)
     assert packed["cga3 gp Vector Vector"] is None
+    lines = packed["cga3 gp Similarity Similarity"]
+    assert lines is not None
+    halves = "four(S(-0.5), S(-0.5), S(0.5), S(-0.5)) * (sum1 - sum2)"
+    assert f"lanes::store<8>(result, {halves});" in lines

@@ -18,7 +18,7 @@ using hamotor::select;
 
 /// gp: Versor Versor -> Versor
 /// a b, the geometric product.
-/// Cost: 40 mul, 36 add (20 fused).  Sparsity: 56 of 64 pairs of components.
+/// Cost: 36 mul, 36 add (20 fused).  Sparsity: 56 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Versor<S> gp(const Versor<S>& a,
                                                     const Versor<S>& b) noexcept {
@@ -31,19 +31,19 @@ template <class S>
   const S b_plus_e12 = b.e12 - b.e012i;
   const S b_minus_e12 = b.e12 + b.e012i;
   const S plus_s =
-      dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, S(2), dot(-a.e01, b.e1i, -a.e02, b.e2i));
-  const S minus_s =
-      dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, S(2), dot(-a.e1i, b.e01, -a.e2i, b.e02));
+      dot(-a.e01, b.e1i, -a.e02, b.e2i, S(0.5), dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12));
+  const S minus_s = dot(-a.e1i, b.e01, -a.e2i, b.e02, S(0.5),
+                        dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12));
   const S plus_e12 =
-      dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, S(2), dot(-a.e01, b.e2i, a.e02, b.e1i));
+      dot(-a.e01, b.e2i, a.e02, b.e1i, S(0.5), dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s));
   const S minus_e12 =
-      dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, S(2), dot(-a.e1i, b.e02, a.e2i, b.e01));
-  return {.s = S(0.5) * (plus_s + minus_s),
-          .e12 = S(0.5) * (plus_e12 + minus_e12),
+      dot(-a.e1i, b.e02, a.e2i, b.e01, S(0.5), dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s));
+  return {.s = plus_s + minus_s,
+          .e12 = plus_e12 + minus_e12,
           .e1i = dot(a.e1i, b_plus_s, -a.e2i, b_plus_e12, a_minus_s, b.e1i, a_minus_e12, b.e2i),
           .e2i = dot(a.e1i, b_plus_e12, a.e2i, b_plus_s, a_minus_s, b.e2i, -a_minus_e12, b.e1i),
-          .e0i = S(-0.5) * (plus_s - minus_s),
-          .e012i = S(-0.5) * (plus_e12 - minus_e12),
+          .e0i = -plus_s + minus_s,
+          .e012i = -plus_e12 + minus_e12,
           .e01 = dot(a.e01, b_minus_s, -a.e02, b_minus_e12, a_plus_s, b.e01, a_plus_e12, b.e02),
           .e02 = dot(a.e01, b_minus_e12, a.e02, b_minus_s, a_plus_s, b.e02, -a_plus_e12, b.e01)};
 }
@@ -87,7 +87,7 @@ template <class S>
 
 /// gp: Even Even -> Even
 /// a b, the geometric product.
-/// Cost: 40 mul, 36 add (20 fused).  Sparsity: 56 of 64 pairs of components.
+/// Cost: 36 mul, 36 add (20 fused).  Sparsity: 56 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
   const S a_plus_s = a.s - a.e0i;
@@ -99,19 +99,19 @@ template <class S>
   const S b_plus_e12 = b.e12 - b.e012i;
   const S b_minus_e12 = b.e12 + b.e012i;
   const S plus_s =
-      dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, S(2), dot(-a.e01, b.e1i, -a.e02, b.e2i));
-  const S minus_s =
-      dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, S(2), dot(-a.e1i, b.e01, -a.e2i, b.e02));
+      dot(-a.e01, b.e1i, -a.e02, b.e2i, S(0.5), dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12));
+  const S minus_s = dot(-a.e1i, b.e01, -a.e2i, b.e02, S(0.5),
+                        dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12));
   const S plus_e12 =
-      dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, S(2), dot(-a.e01, b.e2i, a.e02, b.e1i));
+      dot(-a.e01, b.e2i, a.e02, b.e1i, S(0.5), dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s));
   const S minus_e12 =
-      dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, S(2), dot(-a.e1i, b.e02, a.e2i, b.e01));
-  return {.s = S(0.5) * (plus_s + minus_s),
-          .e12 = S(0.5) * (plus_e12 + minus_e12),
+      dot(-a.e1i, b.e02, a.e2i, b.e01, S(0.5), dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s));
+  return {.s = plus_s + minus_s,
+          .e12 = plus_e12 + minus_e12,
           .e1i = dot(a.e1i, b_plus_s, -a.e2i, b_plus_e12, a_minus_s, b.e1i, a_minus_e12, b.e2i),
           .e2i = dot(a.e1i, b_plus_e12, a.e2i, b_plus_s, a_minus_s, b.e2i, -a_minus_e12, b.e1i),
-          .e0i = S(-0.5) * (plus_s - minus_s),
-          .e012i = S(-0.5) * (plus_e12 - minus_e12),
+          .e0i = -plus_s + minus_s,
+          .e012i = -plus_e12 + minus_e12,
           .e01 = dot(a.e01, b_minus_s, -a.e02, b_minus_e12, a_plus_s, b.e01, a_plus_e12, b.e02),
           .e02 = dot(a.e01, b_minus_e12, a.e02, b_minus_s, a_plus_s, b.e02, -a_plus_e12, b.e01)};
 }
@@ -133,17 +133,25 @@ template <class S>
 
 /// gp: Even Vector -> Odd
 /// a b, the geometric product.
-/// Cost: 32 mul, 24 add (16 fused).  Sparsity: 28 of 32 pairs of components.
+/// Cost: 28 mul, 24 add (16 fused).  Sparsity: 28 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Odd<S> gp(const Even<S>& a, const Vector<S>& v) noexcept {
-  return {.e0 = dot(a.s, v.e0, -a.e0i, v.e0, a.e01, v.e1, a.e02, v.e2),
-          .e1 = dot(a.s, v.e1, a.e12, v.e2, -a.e1i, v.e0, a.e01, v.ei),
-          .e2 = dot(a.s, v.e2, -a.e12, v.e1, -a.e2i, v.e0, a.e02, v.ei),
-          .ei = dot(a.s, v.ei, -a.e1i, v.e1, -a.e2i, v.e2, a.e0i, v.ei),
-          .e012 = dot(a.e12, v.e0, -a.e012i, v.e0, a.e01, v.e2, -a.e02, v.e1),
-          .e01i = dot(a.e1i, v.e0, -a.e0i, v.e1, -a.e012i, v.e2, a.e01, v.ei),
-          .e02i = dot(a.e2i, v.e0, -a.e0i, v.e2, a.e012i, v.e1, a.e02, v.ei),
-          .e12i = dot(a.e12, v.ei, -a.e1i, v.e2, a.e2i, v.e1, a.e012i, v.ei)};
+  const S a_plus_s = a.s - a.e0i;
+  const S a_minus_s = a.s + a.e0i;
+  const S a_plus_e12 = a.e12 - a.e012i;
+  const S a_minus_e12 = a.e12 + a.e012i;
+  const S plus_e1 = dot(a.e01, v.ei, S(0.5), dot(a_plus_s, v.e1, a_plus_e12, v.e2));
+  const S minus_e1 = dot(-a.e1i, v.e0, S(0.5), dot(a_minus_s, v.e1, a_minus_e12, v.e2));
+  const S plus_e2 = dot(a.e02, v.ei, S(0.5), dot(a_plus_s, v.e2, -a_plus_e12, v.e1));
+  const S minus_e2 = dot(-a.e2i, v.e0, S(0.5), dot(a_minus_s, v.e2, -a_minus_e12, v.e1));
+  return {.e0 = dot(a.e01, v.e1, a.e02, v.e2, a_plus_s, v.e0),
+          .e1 = plus_e1 + minus_e1,
+          .e2 = plus_e2 + minus_e2,
+          .ei = dot(-a.e1i, v.e1, -a.e2i, v.e2, a_minus_s, v.ei),
+          .e012 = dot(a.e01, v.e2, -a.e02, v.e1, a_plus_e12, v.e0),
+          .e01i = plus_e1 - minus_e1,
+          .e02i = plus_e2 - minus_e2,
+          .e12i = dot(-a.e1i, v.e2, a.e2i, v.e1, a_minus_e12, v.ei)};
 }
 
 /// gp: Bivector Bivector -> Even

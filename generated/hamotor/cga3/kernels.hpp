@@ -19,39 +19,39 @@ using hamotor::select;
 
 /// gp: Versor Versor -> Versor
 /// a b, the geometric product.
-/// Cost: 144 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
+/// Cost: 136 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Versor<S> gp(const Versor<S>& a, const Versor<S>& b) noexcept {
   if constexpr (lanes::packed<S>) {
     if (!std::is_constant_evaluated()) {
       using lanes::four;
       using lanes::turned;
+      const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_b_s = lanes::load<S, 0>(b);
       const auto four_b_e0i = lanes::load<S, 8>(b);
       const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
-      const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_a_s = lanes::load<S, 0>(a);
       const auto four_a_e0i = lanes::load<S, 8>(a);
       const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) + turned<-1, -2, 3, -4>(four_a_e0i);
-      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_b_e01 = lanes::load<S, 12>(b);
+      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
       const auto sum1 =
-          dot(lanes::each<0>(four_a_plus_s), four_b_plus_s, lanes::each<3>(four_a_plus_s),
-              turned<-4, -3, 2, 1>(four_b_plus_s), lanes::each<2>(four_a_plus_s),
-              turned<-3, 4, 1, -2>(four_b_plus_s), lanes::each<1>(four_a_plus_s),
-              turned<-2, 1, -4, 3>(four_b_plus_s), four(S(2)),
-              dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
-                  turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
-                  four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i)));
+          dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
+              turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
+              four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i), four(S(0.5)),
+              dot(lanes::each<0>(four_a_plus_s), four_b_plus_s, lanes::each<3>(four_a_plus_s),
+                  turned<-4, -3, 2, 1>(four_b_plus_s), lanes::each<2>(four_a_plus_s),
+                  turned<-3, 4, 1, -2>(four_b_plus_s), lanes::each<1>(four_a_plus_s),
+                  turned<-2, 1, -4, 3>(four_b_plus_s)));
       const auto sum2 =
-          dot(lanes::each<0>(four_a_minus_s), four_b_minus_s, lanes::each<3>(four_a_minus_s),
-              turned<-4, -3, 2, 1>(four_b_minus_s), lanes::each<2>(four_a_minus_s),
-              turned<-3, 4, 1, -2>(four_b_minus_s), lanes::each<1>(four_a_minus_s),
-              turned<-2, 1, -4, 3>(four_b_minus_s), four(S(2)),
-              dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
-                  turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
-                  four(a.e123i), turned<4, -1, 2, -3>(four_b_e01)));
+          dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
+              turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
+              four(a.e123i), turned<4, -1, 2, -3>(four_b_e01), four(S(0.5)),
+              dot(lanes::each<0>(four_a_minus_s), four_b_minus_s, lanes::each<3>(four_a_minus_s),
+                  turned<-4, -3, 2, 1>(four_b_minus_s), lanes::each<2>(four_a_minus_s),
+                  turned<-3, 4, 1, -2>(four_b_minus_s), lanes::each<1>(four_a_minus_s),
+                  turned<-2, 1, -4, 3>(four_b_minus_s)));
       const auto sum3 = dot(
           four(a.e1i), four_b_plus_s, four(a.e2i), turned<-4, -3, 2, 1>(four_b_plus_s), four(a.e3i),
           turned<-3, 4, 1, -2>(four_b_plus_s), four(a.e123i), turned<-2, 1, -4, 3>(four_b_plus_s),
@@ -68,9 +68,9 @@ template <class S>
               turned<3, -2, -1, 4>(four_b_e01), lanes::each<1>(four_a_plus_s),
               turned<-4, 1, -2, 3>(four_b_e01));
       Versor<S> result;
-      lanes::store<0>(result, four(S(0.5), S(0.5), S(-0.5), S(0.5)) * (sum1 + sum2));
+      lanes::store<0>(result, turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
-      lanes::store<8>(result, four(S(-0.5), S(-0.5), S(0.5), S(-0.5)) * (sum1 - sum2));
+      lanes::store<8>(result, turned<-1, -2, 3, -4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<12>(result, turned<1, 4, 3, 2>(sum4));
       return result;
     }
@@ -91,35 +91,35 @@ template <class S>
   const S b_minus_e13 = -b.e31 - b.e031i;
   const S b_plus_e23 = b.e23 - b.e023i;
   const S b_minus_e23 = b.e23 + b.e023i;
-  const S plus_s =
-      dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, -a_plus_e13, b_plus_e13, -a_plus_e23,
-          b_plus_e23, S(2), dot(-a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i, a.e0123, b.e123i));
-  const S minus_s =
-      dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, -a_minus_e13, b_minus_e13, -a_minus_e23,
-          b_minus_e23, S(2), dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e123i, b.e0123));
-  const S plus_e23 =
-      dot(a_plus_s, b_plus_e23, -a_plus_e12, b_plus_e13, a_plus_e13, b_plus_e12, a_plus_e23,
-          b_plus_s, S(2), dot(-a.e01, b.e123i, -a.e02, b.e3i, a.e03, b.e2i, -a.e0123, b.e1i));
-  const S minus_e23 =
-      dot(a_minus_s, b_minus_e23, -a_minus_e12, b_minus_e13, a_minus_e13, b_minus_e12, a_minus_e23,
-          b_minus_s, S(2), dot(-a.e1i, b.e0123, -a.e2i, b.e03, a.e3i, b.e02, -a.e123i, b.e01));
-  const S plus_e13 =
-      dot(a_plus_s, b_plus_e13, a_plus_e12, b_plus_e23, a_plus_e13, b_plus_s, -a_plus_e23,
-          b_plus_e12, S(2), dot(-a.e01, b.e3i, a.e02, b.e123i, a.e03, b.e1i, a.e0123, b.e2i));
-  const S minus_e13 =
-      dot(a_minus_s, b_minus_e13, a_minus_e12, b_minus_e23, a_minus_e13, b_minus_s, -a_minus_e23,
-          b_minus_e12, S(2), dot(-a.e1i, b.e03, a.e2i, b.e0123, a.e3i, b.e01, a.e123i, b.e02));
-  const S plus_e12 =
-      dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, -a_plus_e13, b_plus_e23, a_plus_e23,
-          b_plus_e13, S(2), dot(-a.e01, b.e2i, a.e02, b.e1i, -a.e03, b.e123i, -a.e0123, b.e3i));
-  const S minus_e12 =
-      dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, -a_minus_e13, b_minus_e23, a_minus_e23,
-          b_minus_e13, S(2), dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e3i, b.e0123, -a.e123i, b.e03));
+  const S plus_s = dot(-a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i, a.e0123, b.e123i, S(0.5),
+                       dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, -a_plus_e13, b_plus_e13,
+                           -a_plus_e23, b_plus_e23));
+  const S minus_s = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e123i, b.e0123, S(0.5),
+                        dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, -a_minus_e13,
+                            b_minus_e13, -a_minus_e23, b_minus_e23));
+  const S plus_e23 = dot(-a.e01, b.e123i, -a.e02, b.e3i, a.e03, b.e2i, -a.e0123, b.e1i, S(0.5),
+                         dot(a_plus_s, b_plus_e23, -a_plus_e12, b_plus_e13, a_plus_e13, b_plus_e12,
+                             a_plus_e23, b_plus_s));
+  const S minus_e23 = dot(-a.e1i, b.e0123, -a.e2i, b.e03, a.e3i, b.e02, -a.e123i, b.e01, S(0.5),
+                          dot(a_minus_s, b_minus_e23, -a_minus_e12, b_minus_e13, a_minus_e13,
+                              b_minus_e12, a_minus_e23, b_minus_s));
+  const S plus_e13 = dot(-a.e01, b.e3i, a.e02, b.e123i, a.e03, b.e1i, a.e0123, b.e2i, S(0.5),
+                         dot(a_plus_s, b_plus_e13, a_plus_e12, b_plus_e23, a_plus_e13, b_plus_s,
+                             -a_plus_e23, b_plus_e12));
+  const S minus_e13 = dot(-a.e1i, b.e03, a.e2i, b.e0123, a.e3i, b.e01, a.e123i, b.e02, S(0.5),
+                          dot(a_minus_s, b_minus_e13, a_minus_e12, b_minus_e23, a_minus_e13,
+                              b_minus_s, -a_minus_e23, b_minus_e12));
+  const S plus_e12 = dot(-a.e01, b.e2i, a.e02, b.e1i, -a.e03, b.e123i, -a.e0123, b.e3i, S(0.5),
+                         dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, -a_plus_e13, b_plus_e23,
+                             a_plus_e23, b_plus_e13));
+  const S minus_e12 = dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e3i, b.e0123, -a.e123i, b.e03, S(0.5),
+                          dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, -a_minus_e13,
+                              b_minus_e23, a_minus_e23, b_minus_e13));
   return {
-      .s = S(0.5) * (plus_s + minus_s),
-      .e23 = S(0.5) * (plus_e23 + minus_e23),
-      .e31 = S(-0.5) * (plus_e13 + minus_e13),
-      .e12 = S(0.5) * (plus_e12 + minus_e12),
+      .s = plus_s + minus_s,
+      .e23 = plus_e23 + minus_e23,
+      .e31 = -plus_e13 - minus_e13,
+      .e12 = plus_e12 + minus_e12,
       .e1i = dot(a.e1i, b_plus_s, -a.e2i, b_plus_e12, -a.e3i, b_plus_e13, -a.e123i, b_plus_e23,
                  a_minus_s, b.e1i, a_minus_e12, b.e2i, a_minus_e13, b.e3i, -a_minus_e23, b.e123i),
       .e2i = dot(a.e1i, b_plus_e12, a.e2i, b_plus_s, -a.e3i, b_plus_e23, a.e123i, b_plus_e13,
@@ -128,10 +128,10 @@ template <class S>
                  a_minus_s, b.e3i, -a_minus_e12, b.e123i, -a_minus_e13, b.e1i, -a_minus_e23, b.e2i),
       .e123i = dot(a.e1i, b_plus_e23, -a.e2i, b_plus_e13, a.e3i, b_plus_e12, a.e123i, b_plus_s,
                    a_minus_s, b.e123i, a_minus_e12, b.e3i, -a_minus_e13, b.e2i, a_minus_e23, b.e1i),
-      .e0i = S(-0.5) * (plus_s - minus_s),
-      .e023i = S(-0.5) * (plus_e23 - minus_e23),
-      .e031i = S(0.5) * (plus_e13 - minus_e13),
-      .e012i = S(-0.5) * (plus_e12 - minus_e12),
+      .e0i = -plus_s + minus_s,
+      .e023i = -plus_e23 + minus_e23,
+      .e031i = plus_e13 - minus_e13,
+      .e012i = -plus_e12 + minus_e12,
       .e01 = dot(a.e01, b_minus_s, -a.e02, b_minus_e12, -a.e03, b_minus_e13, -a.e0123, b_minus_e23,
                  a_plus_s, b.e01, a_plus_e12, b.e02, a_plus_e13, b.e03, -a_plus_e23, b.e0123),
       .e02 = dot(a.e01, b_minus_e12, a.e02, b_minus_s, -a.e03, b_minus_e23, a.e0123, b_minus_e13,
@@ -294,39 +294,39 @@ template <class S>
 
 /// gp: Even Even -> Even
 /// a b, the geometric product.
-/// Cost: 144 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
+/// Cost: 136 mul, 136 add (88 fused).  Sparsity: 224 of 256 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
   if constexpr (lanes::packed<S>) {
     if (!std::is_constant_evaluated()) {
       using lanes::four;
       using lanes::turned;
+      const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_b_s = lanes::load<S, 0>(b);
       const auto four_b_e0i = lanes::load<S, 8>(b);
       const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
-      const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_a_s = lanes::load<S, 0>(a);
       const auto four_a_e0i = lanes::load<S, 8>(a);
       const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) + turned<-1, -2, 3, -4>(four_a_e0i);
-      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_b_e01 = lanes::load<S, 12>(b);
+      const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
       const auto sum1 =
-          dot(lanes::each<0>(four_a_plus_s), four_b_plus_s, lanes::each<3>(four_a_plus_s),
-              turned<-4, -3, 2, 1>(four_b_plus_s), lanes::each<2>(four_a_plus_s),
-              turned<-3, 4, 1, -2>(four_b_plus_s), lanes::each<1>(four_a_plus_s),
-              turned<-2, 1, -4, 3>(four_b_plus_s), four(S(2)),
-              dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
-                  turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
-                  four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i)));
+          dot(four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i), four(a.e02),
+              turned<-2, -3, 4, 1>(four_b_e1i), four(a.e03), turned<-3, 2, 1, -4>(four_b_e1i),
+              four(a.e0123), turned<4, -1, 2, -3>(four_b_e1i), four(S(0.5)),
+              dot(lanes::each<0>(four_a_plus_s), four_b_plus_s, lanes::each<3>(four_a_plus_s),
+                  turned<-4, -3, 2, 1>(four_b_plus_s), lanes::each<2>(four_a_plus_s),
+                  turned<-3, 4, 1, -2>(four_b_plus_s), lanes::each<1>(four_a_plus_s),
+                  turned<-2, 1, -4, 3>(four_b_plus_s)));
       const auto sum2 =
-          dot(lanes::each<0>(four_a_minus_s), four_b_minus_s, lanes::each<3>(four_a_minus_s),
-              turned<-4, -3, 2, 1>(four_b_minus_s), lanes::each<2>(four_a_minus_s),
-              turned<-3, 4, 1, -2>(four_b_minus_s), lanes::each<1>(four_a_minus_s),
-              turned<-2, 1, -4, 3>(four_b_minus_s), four(S(2)),
-              dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
-                  turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
-                  four(a.e123i), turned<4, -1, 2, -3>(four_b_e01)));
+          dot(four(a.e1i), turned<-1, -4, -3, -2>(four_b_e01), four(a.e2i),
+              turned<-2, -3, 4, 1>(four_b_e01), four(a.e3i), turned<-3, 2, 1, -4>(four_b_e01),
+              four(a.e123i), turned<4, -1, 2, -3>(four_b_e01), four(S(0.5)),
+              dot(lanes::each<0>(four_a_minus_s), four_b_minus_s, lanes::each<3>(four_a_minus_s),
+                  turned<-4, -3, 2, 1>(four_b_minus_s), lanes::each<2>(four_a_minus_s),
+                  turned<-3, 4, 1, -2>(four_b_minus_s), lanes::each<1>(four_a_minus_s),
+                  turned<-2, 1, -4, 3>(four_b_minus_s)));
       const auto sum3 = dot(
           four(a.e1i), four_b_plus_s, four(a.e2i), turned<-4, -3, 2, 1>(four_b_plus_s), four(a.e3i),
           turned<-3, 4, 1, -2>(four_b_plus_s), four(a.e123i), turned<-2, 1, -4, 3>(four_b_plus_s),
@@ -343,9 +343,9 @@ template <class S>
               turned<3, -2, -1, 4>(four_b_e01), lanes::each<1>(four_a_plus_s),
               turned<-4, 1, -2, 3>(four_b_e01));
       Even<S> result;
-      lanes::store<0>(result, four(S(0.5), S(0.5), S(-0.5), S(0.5)) * (sum1 + sum2));
+      lanes::store<0>(result, turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
-      lanes::store<8>(result, four(S(-0.5), S(-0.5), S(0.5), S(-0.5)) * (sum1 - sum2));
+      lanes::store<8>(result, turned<-1, -2, 3, -4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<12>(result, turned<1, 4, 3, 2>(sum4));
       return result;
     }
@@ -366,35 +366,35 @@ template <class S>
   const S b_minus_e13 = -b.e31 - b.e031i;
   const S b_plus_e23 = b.e23 - b.e023i;
   const S b_minus_e23 = b.e23 + b.e023i;
-  const S plus_s =
-      dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, -a_plus_e13, b_plus_e13, -a_plus_e23,
-          b_plus_e23, S(2), dot(-a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i, a.e0123, b.e123i));
-  const S minus_s =
-      dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, -a_minus_e13, b_minus_e13, -a_minus_e23,
-          b_minus_e23, S(2), dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e123i, b.e0123));
-  const S plus_e23 =
-      dot(a_plus_s, b_plus_e23, -a_plus_e12, b_plus_e13, a_plus_e13, b_plus_e12, a_plus_e23,
-          b_plus_s, S(2), dot(-a.e01, b.e123i, -a.e02, b.e3i, a.e03, b.e2i, -a.e0123, b.e1i));
-  const S minus_e23 =
-      dot(a_minus_s, b_minus_e23, -a_minus_e12, b_minus_e13, a_minus_e13, b_minus_e12, a_minus_e23,
-          b_minus_s, S(2), dot(-a.e1i, b.e0123, -a.e2i, b.e03, a.e3i, b.e02, -a.e123i, b.e01));
-  const S plus_e13 =
-      dot(a_plus_s, b_plus_e13, a_plus_e12, b_plus_e23, a_plus_e13, b_plus_s, -a_plus_e23,
-          b_plus_e12, S(2), dot(-a.e01, b.e3i, a.e02, b.e123i, a.e03, b.e1i, a.e0123, b.e2i));
-  const S minus_e13 =
-      dot(a_minus_s, b_minus_e13, a_minus_e12, b_minus_e23, a_minus_e13, b_minus_s, -a_minus_e23,
-          b_minus_e12, S(2), dot(-a.e1i, b.e03, a.e2i, b.e0123, a.e3i, b.e01, a.e123i, b.e02));
-  const S plus_e12 =
-      dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, -a_plus_e13, b_plus_e23, a_plus_e23,
-          b_plus_e13, S(2), dot(-a.e01, b.e2i, a.e02, b.e1i, -a.e03, b.e123i, -a.e0123, b.e3i));
-  const S minus_e12 =
-      dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, -a_minus_e13, b_minus_e23, a_minus_e23,
-          b_minus_e13, S(2), dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e3i, b.e0123, -a.e123i, b.e03));
+  const S plus_s = dot(-a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i, a.e0123, b.e123i, S(0.5),
+                       dot(a_plus_s, b_plus_s, -a_plus_e12, b_plus_e12, -a_plus_e13, b_plus_e13,
+                           -a_plus_e23, b_plus_e23));
+  const S minus_s = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e123i, b.e0123, S(0.5),
+                        dot(a_minus_s, b_minus_s, -a_minus_e12, b_minus_e12, -a_minus_e13,
+                            b_minus_e13, -a_minus_e23, b_minus_e23));
+  const S plus_e23 = dot(-a.e01, b.e123i, -a.e02, b.e3i, a.e03, b.e2i, -a.e0123, b.e1i, S(0.5),
+                         dot(a_plus_s, b_plus_e23, -a_plus_e12, b_plus_e13, a_plus_e13, b_plus_e12,
+                             a_plus_e23, b_plus_s));
+  const S minus_e23 = dot(-a.e1i, b.e0123, -a.e2i, b.e03, a.e3i, b.e02, -a.e123i, b.e01, S(0.5),
+                          dot(a_minus_s, b_minus_e23, -a_minus_e12, b_minus_e13, a_minus_e13,
+                              b_minus_e12, a_minus_e23, b_minus_s));
+  const S plus_e13 = dot(-a.e01, b.e3i, a.e02, b.e123i, a.e03, b.e1i, a.e0123, b.e2i, S(0.5),
+                         dot(a_plus_s, b_plus_e13, a_plus_e12, b_plus_e23, a_plus_e13, b_plus_s,
+                             -a_plus_e23, b_plus_e12));
+  const S minus_e13 = dot(-a.e1i, b.e03, a.e2i, b.e0123, a.e3i, b.e01, a.e123i, b.e02, S(0.5),
+                          dot(a_minus_s, b_minus_e13, a_minus_e12, b_minus_e23, a_minus_e13,
+                              b_minus_s, -a_minus_e23, b_minus_e12));
+  const S plus_e12 = dot(-a.e01, b.e2i, a.e02, b.e1i, -a.e03, b.e123i, -a.e0123, b.e3i, S(0.5),
+                         dot(a_plus_s, b_plus_e12, a_plus_e12, b_plus_s, -a_plus_e13, b_plus_e23,
+                             a_plus_e23, b_plus_e13));
+  const S minus_e12 = dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e3i, b.e0123, -a.e123i, b.e03, S(0.5),
+                          dot(a_minus_s, b_minus_e12, a_minus_e12, b_minus_s, -a_minus_e13,
+                              b_minus_e23, a_minus_e23, b_minus_e13));
   return {
-      .s = S(0.5) * (plus_s + minus_s),
-      .e23 = S(0.5) * (plus_e23 + minus_e23),
-      .e31 = S(-0.5) * (plus_e13 + minus_e13),
-      .e12 = S(0.5) * (plus_e12 + minus_e12),
+      .s = plus_s + minus_s,
+      .e23 = plus_e23 + minus_e23,
+      .e31 = -plus_e13 - minus_e13,
+      .e12 = plus_e12 + minus_e12,
       .e1i = dot(a.e1i, b_plus_s, -a.e2i, b_plus_e12, -a.e3i, b_plus_e13, -a.e123i, b_plus_e23,
                  a_minus_s, b.e1i, a_minus_e12, b.e2i, a_minus_e13, b.e3i, -a_minus_e23, b.e123i),
       .e2i = dot(a.e1i, b_plus_e12, a.e2i, b_plus_s, -a.e3i, b_plus_e23, a.e123i, b_plus_e13,
@@ -403,10 +403,10 @@ template <class S>
                  a_minus_s, b.e3i, -a_minus_e12, b.e123i, -a_minus_e13, b.e1i, -a_minus_e23, b.e2i),
       .e123i = dot(a.e1i, b_plus_e23, -a.e2i, b_plus_e13, a.e3i, b_plus_e12, a.e123i, b_plus_s,
                    a_minus_s, b.e123i, a_minus_e12, b.e3i, -a_minus_e13, b.e2i, a_minus_e23, b.e1i),
-      .e0i = S(-0.5) * (plus_s - minus_s),
-      .e023i = S(-0.5) * (plus_e23 - minus_e23),
-      .e031i = S(0.5) * (plus_e13 - minus_e13),
-      .e012i = S(-0.5) * (plus_e12 - minus_e12),
+      .e0i = -plus_s + minus_s,
+      .e023i = -plus_e23 + minus_e23,
+      .e031i = plus_e13 - minus_e13,
+      .e012i = -plus_e12 + minus_e12,
       .e01 = dot(a.e01, b_minus_s, -a.e02, b_minus_e12, -a.e03, b_minus_e13, -a.e0123, b_minus_e23,
                  a_plus_s, b.e01, a_plus_e12, b.e02, a_plus_e13, b.e03, -a_plus_e23, b.e0123),
       .e02 = dot(a.e01, b_minus_e12, a.e02, b_minus_s, -a.e03, b_minus_e23, a.e0123, b_minus_e13,
@@ -442,26 +442,49 @@ template <class S>
 
 /// gp: Even Vector -> Odd
 /// a b, the geometric product.
-/// Cost: 80 mul, 64 add (48 fused).  Sparsity: 72 of 80 pairs of components.
+/// Cost: 72 mul, 64 add (40 fused).  Sparsity: 72 of 80 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Odd<S> gp(const Even<S>& a, const Vector<S>& v) noexcept {
-  return {
-      .e0 = dot(a.s, v.e0, -a.e0i, v.e0, a.e01, v.e1, a.e02, v.e2, a.e03, v.e3),
-      .e1 = dot(a.s, v.e1, -a.e31, v.e3, a.e12, v.e2, -a.e1i, v.e0, a.e01, v.ei),
-      .e2 = dot(a.s, v.e2, a.e23, v.e3, -a.e12, v.e1, -a.e2i, v.e0, a.e02, v.ei),
-      .e3 = dot(a.s, v.e3, -a.e23, v.e2, a.e31, v.e1, -a.e3i, v.e0, a.e03, v.ei),
-      .ei = dot(a.s, v.ei, -a.e1i, v.e1, -a.e2i, v.e2, -a.e3i, v.e3, a.e0i, v.ei),
-      .e023 = dot(a.e23, v.e0, -a.e023i, v.e0, a.e02, v.e3, -a.e03, v.e2, a.e0123, v.e1),
-      .e031 = dot(a.e31, v.e0, -a.e031i, v.e0, -a.e01, v.e3, a.e03, v.e1, a.e0123, v.e2),
-      .e012 = dot(a.e12, v.e0, -a.e012i, v.e0, a.e01, v.e2, -a.e02, v.e1, a.e0123, v.e3),
-      .e123 = dot(a.e23, v.e1, a.e31, v.e2, a.e12, v.e3, -a.e123i, v.e0, a.e0123, v.ei),
-      .e01i = dot(a.e1i, v.e0, -a.e0i, v.e1, a.e031i, v.e3, -a.e012i, v.e2, a.e01, v.ei),
-      .e02i = dot(a.e2i, v.e0, -a.e0i, v.e2, -a.e023i, v.e3, a.e012i, v.e1, a.e02, v.ei),
-      .e03i = dot(a.e3i, v.e0, -a.e0i, v.e3, a.e023i, v.e2, -a.e031i, v.e1, a.e03, v.ei),
-      .e23i = dot(a.e23, v.ei, -a.e2i, v.e3, a.e3i, v.e2, -a.e123i, v.e1, a.e023i, v.ei),
-      .e31i = dot(a.e31, v.ei, a.e1i, v.e3, -a.e3i, v.e1, -a.e123i, v.e2, a.e031i, v.ei),
-      .e12i = dot(a.e12, v.ei, -a.e1i, v.e2, a.e2i, v.e1, -a.e123i, v.e3, a.e012i, v.ei),
-      .e0123i = dot(a.e123i, v.e0, -a.e023i, v.e1, -a.e031i, v.e2, -a.e012i, v.e3, a.e0123, v.ei)};
+  const S a_plus_s = a.s - a.e0i;
+  const S a_minus_s = a.s + a.e0i;
+  const S a_plus_e12 = a.e12 - a.e012i;
+  const S a_minus_e12 = a.e12 + a.e012i;
+  const S a_plus_e13 = -a.e31 + a.e031i;
+  const S a_minus_e13 = -a.e31 - a.e031i;
+  const S a_plus_e23 = a.e23 - a.e023i;
+  const S a_minus_e23 = a.e23 + a.e023i;
+  const S plus_e1 =
+      dot(a.e01, v.ei, S(0.5), dot(a_plus_s, v.e1, a_plus_e12, v.e2, a_plus_e13, v.e3));
+  const S minus_e1 =
+      dot(-a.e1i, v.e0, S(0.5), dot(a_minus_s, v.e1, a_minus_e12, v.e2, a_minus_e13, v.e3));
+  const S plus_e2 =
+      dot(a.e02, v.ei, S(0.5), dot(a_plus_s, v.e2, -a_plus_e12, v.e1, a_plus_e23, v.e3));
+  const S minus_e2 =
+      dot(-a.e2i, v.e0, S(0.5), dot(a_minus_s, v.e2, -a_minus_e12, v.e1, a_minus_e23, v.e3));
+  const S plus_e3 =
+      dot(a.e03, v.ei, S(0.5), dot(a_plus_s, v.e3, -a_plus_e13, v.e1, -a_plus_e23, v.e2));
+  const S minus_e3 =
+      dot(-a.e3i, v.e0, S(0.5), dot(a_minus_s, v.e3, -a_minus_e13, v.e1, -a_minus_e23, v.e2));
+  const S plus_e123 =
+      dot(a.e0123, v.ei, S(0.5), dot(a_plus_e12, v.e3, -a_plus_e13, v.e2, a_plus_e23, v.e1));
+  const S minus_e123 =
+      dot(-a.e123i, v.e0, S(0.5), dot(a_minus_e12, v.e3, -a_minus_e13, v.e2, a_minus_e23, v.e1));
+  return {.e0 = dot(a.e01, v.e1, a.e02, v.e2, a.e03, v.e3, a_plus_s, v.e0),
+          .e1 = plus_e1 + minus_e1,
+          .e2 = plus_e2 + minus_e2,
+          .e3 = plus_e3 + minus_e3,
+          .ei = dot(-a.e1i, v.e1, -a.e2i, v.e2, -a.e3i, v.e3, a_minus_s, v.ei),
+          .e023 = dot(a.e02, v.e3, -a.e03, v.e2, a.e0123, v.e1, a_plus_e23, v.e0),
+          .e031 = dot(-a.e01, v.e3, a.e03, v.e1, a.e0123, v.e2, -a_plus_e13, v.e0),
+          .e012 = dot(a.e01, v.e2, -a.e02, v.e1, a.e0123, v.e3, a_plus_e12, v.e0),
+          .e123 = plus_e123 + minus_e123,
+          .e01i = plus_e1 - minus_e1,
+          .e02i = plus_e2 - minus_e2,
+          .e03i = plus_e3 - minus_e3,
+          .e23i = dot(-a.e2i, v.e3, a.e3i, v.e2, -a.e123i, v.e1, a_minus_e23, v.ei),
+          .e31i = dot(a.e1i, v.e3, -a.e3i, v.e1, -a.e123i, v.e2, -a_minus_e13, v.ei),
+          .e12i = dot(-a.e1i, v.e2, a.e2i, v.e1, -a.e123i, v.e3, a_minus_e12, v.ei),
+          .e0123i = plus_e123 - minus_e123};
 }
 
 /// gp: Bivector Bivector -> Even
@@ -546,7 +569,7 @@ template <class S>
 
 /// gp: Versor Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 128 mul, 112 add (80 fused).  Sparsity: 136 of 160 pairs of components.
+/// Cost: 120 mul, 112 add (72 fused).  Sparsity: 136 of 160 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Versor<S>& m, const Bivector<S>& b) noexcept {
   const S m_plus_s = m.s - m.e0i;
@@ -557,26 +580,34 @@ template <class S>
   const S m_minus_e13 = -m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 - m.e023i;
   const S m_minus_e23 = m.e23 + m.e023i;
-  const S plus_s = dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, b.e31, m_plus_e13, -b.e23, m_plus_e23,
-                       S(2), dot(-b.e1i, m.e01, -b.e2i, m.e02, -b.e3i, m.e03));
-  const S minus_s = dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, b.e31, m_minus_e13, -b.e23,
-                        m_minus_e23, S(2), dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i));
-  const S plus_e23 = dot(b.e23, m_plus_s, b.e31, m_plus_e12, b.e12, m_plus_e13, -b.e0i, m_plus_e23,
-                         S(2), dot(-b.e3i, m.e02, b.e2i, m.e03, -b.e1i, m.e0123));
-  const S minus_e23 = dot(b.e23, m_minus_s, b.e31, m_minus_e12, b.e12, m_minus_e13, b.e0i,
-                          m_minus_e23, S(2), dot(-b.e03, m.e2i, b.e02, m.e3i, -b.e01, m.e123i));
-  const S plus_e13 = dot(-b.e31, m_plus_s, b.e23, m_plus_e12, -b.e0i, m_plus_e13, -b.e12,
-                         m_plus_e23, S(2), dot(-b.e3i, m.e01, b.e1i, m.e03, b.e2i, m.e0123));
-  const S minus_e13 = dot(-b.e31, m_minus_s, b.e23, m_minus_e12, b.e0i, m_minus_e13, -b.e12,
-                          m_minus_e23, S(2), dot(-b.e03, m.e1i, b.e01, m.e3i, b.e02, m.e123i));
-  const S plus_e12 = dot(b.e12, m_plus_s, -b.e0i, m_plus_e12, -b.e23, m_plus_e13, -b.e31,
-                         m_plus_e23, S(2), dot(-b.e2i, m.e01, b.e1i, m.e02, -b.e3i, m.e0123));
-  const S minus_e12 = dot(b.e12, m_minus_s, b.e0i, m_minus_e12, -b.e23, m_minus_e13, -b.e31,
-                          m_minus_e23, S(2), dot(-b.e02, m.e1i, b.e01, m.e2i, -b.e03, m.e123i));
-  return {.s = S(0.5) * (plus_s + minus_s),
-          .e23 = S(0.5) * (plus_e23 + minus_e23),
-          .e31 = S(-0.5) * (plus_e13 + minus_e13),
-          .e12 = S(0.5) * (plus_e12 + minus_e12),
+  const S plus_s =
+      dot(-b.e1i, m.e01, -b.e2i, m.e02, -b.e3i, m.e03, S(0.5),
+          dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, b.e31, m_plus_e13, -b.e23, m_plus_e23));
+  const S minus_s =
+      dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, S(0.5),
+          dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, b.e31, m_minus_e13, -b.e23, m_minus_e23));
+  const S plus_e23 =
+      dot(-b.e3i, m.e02, b.e2i, m.e03, -b.e1i, m.e0123, S(0.5),
+          dot(b.e23, m_plus_s, b.e31, m_plus_e12, b.e12, m_plus_e13, -b.e0i, m_plus_e23));
+  const S minus_e23 =
+      dot(-b.e03, m.e2i, b.e02, m.e3i, -b.e01, m.e123i, S(0.5),
+          dot(b.e23, m_minus_s, b.e31, m_minus_e12, b.e12, m_minus_e13, b.e0i, m_minus_e23));
+  const S plus_e13 =
+      dot(-b.e3i, m.e01, b.e1i, m.e03, b.e2i, m.e0123, S(0.5),
+          dot(-b.e31, m_plus_s, b.e23, m_plus_e12, -b.e0i, m_plus_e13, -b.e12, m_plus_e23));
+  const S minus_e13 =
+      dot(-b.e03, m.e1i, b.e01, m.e3i, b.e02, m.e123i, S(0.5),
+          dot(-b.e31, m_minus_s, b.e23, m_minus_e12, b.e0i, m_minus_e13, -b.e12, m_minus_e23));
+  const S plus_e12 =
+      dot(-b.e2i, m.e01, b.e1i, m.e02, -b.e3i, m.e0123, S(0.5),
+          dot(b.e12, m_plus_s, -b.e0i, m_plus_e12, -b.e23, m_plus_e13, -b.e31, m_plus_e23));
+  const S minus_e12 =
+      dot(-b.e02, m.e1i, b.e01, m.e2i, -b.e03, m.e123i, S(0.5),
+          dot(b.e12, m_minus_s, b.e0i, m_minus_e12, -b.e23, m_minus_e13, -b.e31, m_minus_e23));
+  return {.s = plus_s + minus_s,
+          .e23 = plus_e23 + minus_e23,
+          .e31 = -plus_e13 - minus_e13,
+          .e12 = plus_e12 + minus_e12,
           .e1i = dot(-b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i, -b.e23, m.e123i, b.e1i, m_minus_s,
                      b.e2i, m_minus_e12, b.e3i, m_minus_e13),
           .e2i = dot(b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i, -b.e31, m.e123i, b.e2i, m_minus_s,
@@ -585,10 +616,10 @@ template <class S>
                      -b.e1i, m_minus_e13, -b.e2i, m_minus_e23),
           .e123i = dot(b.e23, m.e1i, b.e31, m.e2i, b.e12, m.e3i, -b.e0i, m.e123i, b.e3i,
                        m_minus_e12, -b.e2i, m_minus_e13, b.e1i, m_minus_e23),
-          .e0i = S(-0.5) * (plus_s - minus_s),
-          .e023i = S(-0.5) * (plus_e23 - minus_e23),
-          .e031i = S(0.5) * (plus_e13 - minus_e13),
-          .e012i = S(-0.5) * (plus_e12 - minus_e12),
+          .e0i = -plus_s + minus_s,
+          .e023i = -plus_e23 + minus_e23,
+          .e031i = plus_e13 - minus_e13,
+          .e012i = -plus_e12 + minus_e12,
           .e01 = dot(b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03, -b.e23, m.e0123, b.e01, m_plus_s,
                      b.e02, m_plus_e12, b.e03, m_plus_e13),
           .e02 = dot(b.e12, m.e01, b.e0i, m.e02, -b.e23, m.e03, -b.e31, m.e0123, b.e02, m_plus_s,
@@ -2318,26 +2349,28 @@ template <class S>
 /// exp(B) = 1 + B + B²/2 + ….
 /// Relative error at most 4 ulp of the result's norm and ε² of the translation's, for half
 /// angles up to 1/(8 ε).
-/// Cost: 22 mul, 5 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_pair, 1
-/// double_word_scaled, 1 double_word_sqrt, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
+/// Cost: 22 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
+/// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
 [[nodiscard]] constexpr Motor<S> exp(const Line<S>& l) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(l.e12, -l.e31, l.e23));
   const S w_e12 = w_scaling.in * l.e12;
   const S w_e13 = w_scaling.in * -l.e31;
   const S w_e23 = w_scaling.in * l.e23;
-  const auto squares = scalar::compensated_dot_pair(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
-  const auto length = scalar::double_word_sqrt(squares);
-  const auto angle = scalar::double_word_scaled(length, w_scaling.out);
+  const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
+  const auto root = scalar::double_word_sqrt_parts(squares);
+  const auto angle = scalar::double_word_scaled(root, w_scaling.out);
   const auto turn = scalar::sin_cos(angle);
-  const S spin = select(length.hi > S(0), turn.sin / length.hi, S(0));
+  const S length = root.hi + root.lo;
+  const S spin = select(length > S(0), turn.sin / length, S(0));
   const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
   const auto v_scaling = scalar::scaling(scalar::max_abs(l.e1i, l.e2i, l.e3i));
   const S v_e1i = v_scaling.in * l.e1i;
   const S v_e2i = v_scaling.in * l.e2i;
   const S v_e3i = v_scaling.in * l.e3i;
   const S product = scalar::compensated_dot(w_e12, v_e3i, -w_e13, v_e2i, w_e23, v_e1i);
-  const S along = (sinc - turn.cos) * select(squares.hi > S(0), product / squares.hi, S(0));
+  const S square = squares.hi + squares.lo;
+  const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
           .e31 = -(spin * w_e13),
@@ -2352,15 +2385,16 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 37 mul, 5 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 6 compensated_dot_pair, 1
-/// double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
+/// Cost: 37 mul, 6 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 5 compensated_dot_pair, 1
+/// compensated_dot_parts, 1 double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling,
+/// 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Line<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
   const S r_e23 = r_scaling.in * m.e23;
-  const auto squares = scalar::compensated_dot_pair(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
+  const auto squares = scalar::compensated_dot_parts(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
   const auto root_of_squares = scalar::double_word_sqrt(squares);
   const S sine = root_of_squares.hi * r_scaling.out;
   const S angle = scalar::atan2(sine, m.s);
@@ -2378,7 +2412,8 @@ template <class S>
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e3i, -r_e13, q_e2i, r_e23, q_e1i);
   const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
                                                   overlap.lo, inverse.hi);
-  const S norm2 = scalar::compensated_dot(m.s, m.s, squares.hi * r_scaling.out, r_scaling.out);
+  const S norm2 =
+      scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
   const S along =
       -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e123i, r_scaling.out) / norm2;
   const auto moment_e2i = scalar::compensated_dot_pair(-r_e12, q_e1i, r_e23, q_e3i);

@@ -205,8 +205,8 @@ template <class S>
 /// exp(B) = 1 + B + B²/2 + ….
 /// Relative error at most 4 ulp of the result's norm and ε² of the translation's, for half
 /// angles up to 1/(8 ε).
-/// Cost: 28 mul, 5 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_pair, 1
-/// double_word_scaled, 1 double_word_sqrt, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
+/// Cost: 28 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
+/// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
 [[nodiscard]] constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
@@ -219,18 +219,20 @@ template <class S>
   const S w_e12 = w_scaling.in * b_e12;
   const S w_e13 = w_scaling.in * b_e13;
   const S w_e23 = w_scaling.in * b_e23;
-  const auto squares = scalar::compensated_dot_pair(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
-  const auto length = scalar::double_word_sqrt(squares);
-  const auto angle = scalar::double_word_scaled(length, w_scaling.out);
+  const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
+  const auto root = scalar::double_word_sqrt_parts(squares);
+  const auto angle = scalar::double_word_scaled(root, w_scaling.out);
   const auto turn = scalar::sin_cos(angle);
-  const S spin = select(length.hi > S(0), turn.sin / length.hi, S(0));
+  const S length = root.hi + root.lo;
+  const S spin = select(length > S(0), turn.sin / length, S(0));
   const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
   const auto v_scaling = scalar::scaling(scalar::max_abs(b_e01, b_e02, b_e03));
   const S v_e01 = v_scaling.in * b_e01;
   const S v_e02 = v_scaling.in * b_e02;
   const S v_e03 = v_scaling.in * b_e03;
   const S product = scalar::compensated_dot(w_e12, v_e03, -w_e13, v_e02, w_e23, v_e01);
-  const S along = (sinc - turn.cos) * select(squares.hi > S(0), product / squares.hi, S(0));
+  const S square = squares.hi + squares.lo;
+  const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
           .e31 = -(spin * w_e13),
@@ -245,15 +247,16 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 43 mul, 5 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 6 compensated_dot_pair, 1
-/// double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
+/// Cost: 43 mul, 6 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 5 compensated_dot_pair, 1
+/// compensated_dot_parts, 1 double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling,
+/// 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
   const S r_e23 = r_scaling.in * m.e23;
-  const auto squares = scalar::compensated_dot_pair(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
+  const auto squares = scalar::compensated_dot_parts(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
   const auto root_of_squares = scalar::double_word_sqrt(squares);
   const S sine = root_of_squares.hi * r_scaling.out;
   const S angle = scalar::atan2(sine, m.s);
@@ -271,7 +274,8 @@ template <class S>
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01);
   const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
                                                   overlap.lo, inverse.hi);
-  const S norm2 = scalar::compensated_dot(m.s, m.s, squares.hi * r_scaling.out, r_scaling.out);
+  const S norm2 =
+      scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
   const S along =
       -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e0123, r_scaling.out) / norm2;
   const auto moment_e02 = scalar::compensated_dot_pair(-r_e12, q_e01, r_e23, q_e03);

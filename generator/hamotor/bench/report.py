@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 BASELINE = "Eigen"
+CONVERTED = "Eigen Isometry3, converted"
 MODES = ("latency", "array of 256", "array of 4096")
 _BLUE, _SKY, _GREY = "#0072B2", "#56B4E9", "#8a8a8a"
 _ORANGE, _VERMILLION, _GREEN, _PURPLE = "#E69F00", "#D55E00", "#009E73", "#CC79A7"
@@ -16,6 +17,7 @@ _COLOURS = {
     "generated, lean": "#4f9bd9",
     "Eigen quaternion + translation": _ORANGE,
     "Eigen Isometry3": _VERMILLION,
+    CONVERTED: "#f0b08a",
     "Eigen 4x4 matrix": _PURPLE,
     "Eigen 5x5 matrix": _VERMILLION,
     "Eigen 4x4 complex": _PURPLE,
@@ -48,6 +50,7 @@ def table(account: Mapping[str, Any]) -> str:
     said = account["provenance"]
     lines += [
         f"ns: {account['unit']}; x: ratio to the best Eigen over all compilers (< 1 is faster)",
+        f"Eigen's matrices are given as such; {CONVERTED} is made of quaternion and translation",
         f"error: {account['error']}",
         f"{said['processor']}; {'; '.join(said['compilers'].values())}; {said['flags']}",
     ]

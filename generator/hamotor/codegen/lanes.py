@@ -95,42 +95,49 @@ def _returned(program: Program, place: Mapping[str, tuple[str, int]]) -> list[st
 def _block(
     outputs: Sequence[tuple[str, Expression]], place: Mapping[str, tuple[str, int]]
 ) -> str | None:
-    """Four components of the result as one vector: four lanes, or multiples of x ± y for lanes."""
+    """Four components of the result as one vector: four lanes, or sums ±x ± y and multiples."""
     if len(outputs) < WIDTH:
         return None
-
-    def lanes_of(names: Sequence[str]) -> tuple[str, list[int]] | None:
-        found = [place.get(name, ("", 0)) for name in names]
-        wheres = {where for where, _ in found}
-        return (wheres.pop(), [lane for _, lane in found]) if len(wheres) == 1 else None
-
     if all(name in place for name, _ in outputs):
-        sums = lanes_of([name for name, _ in outputs])
-        return _in_order(*sums) if sums else None
-    factors, sides = [], []
+        return _in_order(place, [Name(name) for name, _ in outputs])
+    factors, left, right = [], [], []
     for _, expression in outputs:
         match expression:
-            case Product(Number() as factor, Sum(Name(x), Name(y))):
-                factors.append(factor)
-                sides.append((x, y, "+"))
-            case Product(Number() as factor, Sum(Name(x), Negative(Name(y)))):
-                factors.append(factor)
-                sides.append((x, y, "-"))
+            case Product(Number() as factor, Sum(x, y)):
+                factors.append(cpp.expression_text(factor))
+            case Sum(x, y):
+                pass
             case _:
                 return None
-    left, right = lanes_of([x for x, _, _ in sides]), lanes_of([y for _, y, _ in sides])
-    signs = {sign for _, _, sign in sides}
-    if not (left and right and left[0] and right[0]) or left[1] != right[1] or len(signs) != 1:
+        left.append(x)
+        right.append(y)
+    operator = "+"
+    if all(isinstance(y, Negative) for y in right):
+        operator, right = "-", [_unsigned(y)[1] for y in right]
+    sides = _in_order(place, left), _in_order(place, right)
+    if len(factors) not in (0, WIDTH) or sides[0] is None or sides[1] is None:
         return None
-    listed = ", ".join(cpp.expression_text(factor) for factor in factors)
-    both = _in_order(f"({left[0]} {signs.pop()} {right[0]})", left[1])
-    return f"four({listed}) * {both}"
+    both = f" {operator} ".join(filter(None, sides))
+    return f"four({', '.join(factors)}) * ({both})" if factors else both
 
 
-def _in_order(vector: str, lanes: Sequence[int]) -> str:
-    if list(lanes) == list(range(WIDTH)):
+def _in_order(place: Mapping[str, tuple[str, int]], lanes: Sequence[Expression]) -> str | None:
+    """Lanes of one sum, in another order and with signs."""
+    order = []
+    vectors = set()
+    for lane in lanes:
+        sign, x = _unsigned(lane)
+        if not isinstance(x, Name) or x.text not in place:
+            return None
+        vector, number = place[x.text]
+        vectors.add(vector)
+        order.append(sign * (number + 1))
+    if len(vectors) != 1:
+        return None
+    (vector,) = vectors
+    if order == list(range(1, WIDTH + 1)):
         return vector
-    return f"turned<{', '.join(str(lane + 1) for lane in lanes)}>({vector})"
+    return f"turned<{', '.join(map(str, order))}>({vector})"
 
 
 def _unsigned(expression: Expression) -> tuple[int, Expression]:

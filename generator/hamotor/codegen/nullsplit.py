@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from hamotor.codegen import polynomial as poly
-from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, ratio
+from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, magnitude, ratio
 from hamotor.codegen.element import Element
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
@@ -83,11 +83,15 @@ def split_program(
         rest = turned.get(other, {})
         poly.add_scaled(plus, rest, ratio(1, sign))
         poly.add_scaled(minus, rest, ratio(-1, sign))
+        # Terms that do not come from A P± in both operands would be doubled first and the results
+        # halved: half sums, of which only the other terms are halved, cost less.
+        whole = 2 if any(magnitude(x) == 2 for p in (plus, minus) for x in p.values()) else 1
         halves: dict[str, Polynomial] = {}
         for half, p in (("plus", plus), ("minus", minus)):
             if p:
-                bindings.append((f"{half}_{name}", polynomial_expression(p)))
-                halves[half] = {(f"{half}_{name}",): 1}
+                expression = polynomial_expression(poly.scaled(p, ratio(1, whole)))
+                bindings.append((f"{half}_{name}", expression))
+                halves[half] = {(f"{half}_{name}",): whole}
         total: Polynomial = {}
         difference: Polynomial = {}
         for half, sign_of_half in (("plus", 1), ("minus", -1)):
@@ -106,6 +110,8 @@ def _halved(p: Polynomial, factor: Rational) -> Expression:
     if not p:
         return number(0)
     content = ratio(poly.content(p) * factor, 2)
+    if magnitude(content) == 1:
+        return polynomial_expression(poly.scaled(p, ratio(factor, 2)))
     return Product(
         number(content), polynomial_expression(poly.scaled(p, ratio(1, poly.content(p))))
     )

@@ -216,11 +216,13 @@ def exp_kernel(
     writer = Writer()
     b = _coefficients(writer, algebra, value, "b")
     w = _scaled(writer, {u: b[u] for u in plane.rotation}, "w", algebra)
-    writer.let("squares", call("compensated_dot_pair", *_squared(w.values)))
-    writer.let("length", call("double_word_sqrt", Name("squares")))
-    writer.let("angle", call("double_word_scaled", Name("length"), w.outward))
+    # sin and cos of √hi take longest: they start before what its rounding lost is known.
+    writer.let("squares", call("compensated_dot_parts", *_squared(w.values)))
+    writer.let("root", call("double_word_sqrt_parts", Name("squares")))
+    writer.let("angle", call("double_word_scaled", Name("root"), w.outward))
     writer.let("turn", call("sin_cos", Name("angle")))
-    sine, cosine, length = Name("turn.sin"), Name("turn.cos"), Name("length.hi")
+    sine, cosine = Name("turn.sin"), Name("turn.cos")
+    length = writer.let("length", Sum(Name("root.hi"), Name("root.lo")))
     spin = writer.let("spin", Select(length, Quotient(sine, length), ZERO))
     out: dict[Blade, Expression] = {0: cosine}
     for u in plane.rotation:
@@ -233,7 +235,7 @@ def exp_kernel(
         v = _scaled(writer, {v: b[v] for v in plane.translation}, "v", algebra)
         terms = [x for axis, blade in pitch_pairs(plane, w.values) for x in (axis, v.values[blade])]
         product = writer.let("product", call("compensated_dot", *terms))
-        square = Name("squares.hi")
+        square = writer.let("square", Sum(Name("squares.hi"), Name("squares.lo")))
         share = Select(square, Quotient(product, square), ZERO)
         along = writer.let("along", Product(Sum(sinc, Negative(cosine)), share))
         axis = axis_part(plane, w.values)
@@ -274,7 +276,7 @@ def log_kernel(
     m = _coefficients(writer, algebra, value, "m")
     cosine = m[0]
     r = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
-    squares = writer.let("squares", call("compensated_dot_pair", *_squared(r.values)))
+    squares = writer.let("squares", call("compensated_dot_parts", *_squared(r.values)))
     writer.let("root_of_squares", call("double_word_sqrt", squares))
     length = Name("root_of_squares.hi")
     sine = writer.let("sine", Product(length, r.outward))
@@ -325,7 +327,8 @@ def log_kernel(
     )
     parts = [x for part in ("hi", "lo") for x in (cosine, _part(share, part))]
     lengthwise = call("compensated_dot", *parts, q.values[quad], r.outward)
-    sine2 = Product(_part(squares, "hi"), r.outward), r.outward
+    square = Sum(_part(squares, "hi"), _part(squares, "lo"))
+    sine2 = Product(square, r.outward), r.outward
     norm2 = writer.let("norm2", call("compensated_dot", cosine, cosine, *sine2))
     along = writer.let("along", Quotient(negative(lengthwise), norm2))
     q_moved = {v: q.values[v] for v in moved}

@@ -572,14 +572,23 @@ HAMOTOR_INLINE constexpr void accumulate(S& sum, S& low, const S& a, const S& b,
 
 }  // namespace detail
 
-/// a₁ b₁ + a₂ b₂ + … to about twice the working precision (Ogita, Rump & Oishi 2005, Dot2).
+/// a₁ b₁ + a₂ b₂ + … to about twice the working precision, as the sum that is rounded at every
+/// term, known early, and what that lost: of squares, up to 2 ulp.
 template <class S, class... Rest>
-[[nodiscard]] HAMOTOR_INLINE constexpr DoubleWord<S> compensated_dot_pair(
+[[nodiscard]] HAMOTOR_INLINE constexpr DoubleWord<S> compensated_dot_parts(
     const S& a, const S& b, const Rest&... rest) noexcept {
   S sum = a * b;
   S low = product_error(a, b, sum);
   detail::accumulate(sum, low, rest...);
-  return two_sum(sum, low);
+  return {sum, low};
+}
+
+/// a₁ b₁ + a₂ b₂ + … to about twice the working precision (Ogita, Rump & Oishi 2005, Dot2).
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr DoubleWord<S> compensated_dot_pair(
+    const S& a, const S& b, const Rest&... rest) noexcept {
+  const auto parts = compensated_dot_parts(a, b, rest...);
+  return two_sum(parts.hi, parts.lo);
 }
 
 /// a₁ b₁ + a₂ b₂ + … as if computed in twice the precision and rounded once.
@@ -589,13 +598,19 @@ template <class S, class... Rest>
   return compensated_dot_pair(a, b, rest...).hi;
 }
 
-/// √x of a double-word number ≥ 0; 0 for 0.
+/// √x as √hi, known early, and what that leaves; 0 for 0.  The low part of x may be some ulp.
 template <class S>
-[[nodiscard]] constexpr DoubleWord<S> double_word_sqrt(const DoubleWord<S>& x) noexcept {
+[[nodiscard]] constexpr DoubleWord<S> double_word_sqrt_parts(const DoubleWord<S>& x) noexcept {
   const S root = sqrt(x.hi);
   const S rest = -product_error(root, root, x.hi) + x.lo;
-  const S correction = select(root > S(0), rest / (root + root), S(0));
-  return two_sum(root, correction);
+  return {root, select(root > S(0), rest / (root + root), S(0))};
+}
+
+/// √x of a double-word number ≥ 0; 0 for 0.  The low part of x may be some ulp.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_sqrt(const DoubleWord<S>& x) noexcept {
+  const auto parts = double_word_sqrt_parts(x);
+  return two_sum(parts.hi, parts.lo);
 }
 
 /// x times a power of two; what would overflow becomes the largest number.
@@ -629,9 +644,12 @@ template <class S>
 }
 
 /// sin and cos of a double-word angle, each as accurate as the scalar's own sin and cos up to
-/// angles of about 1/(8 ε); beyond, of an angle that agrees in its leading word.
+/// angles of about 1/(8 ε); beyond, of an angle that agrees in its leading word.  The low part may
+/// be some ulp: a branch, not a select, lets a processor start with the leading word at once.
 template <class S>
-[[nodiscard]] constexpr Turn<S> sin_cos(const DoubleWord<S>& angle) noexcept {
+[[nodiscard]] constexpr Turn<S> sin_cos(DoubleWord<S> angle) noexcept {
+  const S moderate = constant([] { return power_of_two<S>(Limits<S>::digits - 8); });
+  if (!all(abs(angle.hi) < moderate)) angle = two_sum(angle.hi, angle.lo);
   const S sine = sin(angle.hi);
   const S cosine = cos(angle.hi);
   // At most 1/16 up to angles of 1/(8 ε): four terms of each series are enough.
