@@ -649,7 +649,10 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Turn<S> sin_cos(DoubleWord<S> angle) noexcept {
   const S moderate = constant([] { return power_of_two<S>(Limits<S>::digits - 8); });
-  if (!all(abs(angle.hi) < moderate)) angle = two_sum(angle.hi, angle.lo);
+  if (const auto small = abs(angle.hi) < moderate; !all(small)) {
+    const auto sum = two_sum(angle.hi, angle.lo);
+    angle = {select(small, angle.hi, sum.hi), select(small, angle.lo, sum.lo)};
+  }
   const S sine = sin(angle.hi);
   const S cosine = cos(angle.hi);
   // At most 1/16 up to angles of 1/(8 ε): four terms of each series are enough.
