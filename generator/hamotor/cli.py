@@ -228,6 +228,12 @@ def _add_run(parser: _Parser) -> None:
         help="for methods that choose their steps: error per second; nothing is verified",
     )
     parser.add_argument(
+        "--compensated",
+        action=argparse.BooleanOptionalAction,
+        help="whether sums over steps keep the digits that each addition would lose"
+        " (default: where that costs the method little)",
+    )
+    parser.add_argument(
         "--end", metavar="T", type=_finite, help="end time, s; before 0: back in time"
     )
     rows = parser.add_mutually_exclusive_group()
@@ -404,6 +410,7 @@ def _run(parsed: argparse.Namespace) -> int:
             tolerance=parsed.tolerance,
             local_tolerance=parsed.local_tolerance,
             method=parsed.method,
+            compensated=parsed.compensated,
             every=parsed.every,
             times=parsed.at,
             interval=parsed.interval,
@@ -451,6 +458,7 @@ def _run_ensemble(parsed: argparse.Namespace) -> int:
             step=parsed.step,
             local_tolerance=parsed.local_tolerance,
             method=parsed.method,
+            compensated=parsed.compensated,
             every=parsed.every,
             times=parsed.at,
             interval=parsed.interval,

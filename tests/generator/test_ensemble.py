@@ -381,6 +381,7 @@ stiffness = 50.0
 end = 1.0
 step = 0.005
 method = "rk4"
+compensated = true
 [output]
 every = 100
 [[ensemble.parameter]]
@@ -420,6 +421,7 @@ def test_members_have_parameters_of_their_own(bounce: Simulation) -> None:
         turning = (0.01 + 8.0 + 0.225) / 2
         energy = turning + stiffness[member] * 1.09 / 2 - 2.0 * field[member]
         np.testing.assert_allclose(found["energy"], energy, rtol=1e-7)
+    assert run.report["compensated"] is True
     alone = run_ensemble(bounce, members, member=13, seed=4)
     assert (alone.states[0] == run.states[13]).all()
 
@@ -437,7 +439,7 @@ def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:
     states = np.tile(bounce.state, (19, 1))
     states[:, 8:] += np.linspace(-1, 1, 19)[:, np.newaxis]
     run = run_ensemble(bounce, states=states, end=0.1)
-    library = bounce.compile(method="rk4", ensembles=True).library
+    library = bounce.compile(method="rk4", compensated=True, ensembles=True).library
     for member in range(19):
         with library.start("rk4", step=0.005, state=states[member]) as live:
             live.advance(20, 0, None)

@@ -188,6 +188,8 @@ def test_a_method_that_only_motors_have_gives_way_unless_it_is_asked_for() -> No
     assert run.report["method"] == "rkmk4"
     with pytest.raises(hamotor.UsageError, match=r'"splitting2".*rkmk4'):
         simulation.run(end=0.1, method="splitting2", representation="matrix")
+    with pytest.raises(hamotor.UsageError, match="plain sums; leave compensated out"):
+        simulation.run(end=0.1, compensated=True, representation="matrix")
 
 
 def scene_of(text: str) -> Any:

@@ -178,6 +178,9 @@ def test_a_planar_body_turns_anticlockwise() -> None:
     assert scene(text).group is GROUPS["SE2"]
     chosen = 'step = 0.1\n    method = "rkmk54"\n    local_tolerance = 1e-6'
     assert scene(text.replace("tolerance = 1e-9", chosen)).time.local_tolerance == 1e-6
+    assert scene(text).time.compensated is None
+    plain = text.replace("tolerance = 1e-9", "tolerance = 1e-9\n    compensated = false")
+    assert scene(plain).time.compensated is False
 
 
 def test_the_state_of_a_fixed_point_is_a_rotor_and_an_angular_momentum() -> None:

@@ -137,6 +137,7 @@ MISTAKES: dict[str, tuple[str, str, str, list[str]]] = {
     "absurdly many steps": (TOP, "step = 0.01", "step = 1e-12", ["step: end / step is 1e+13; at most 1e+12 steps"]),
     "tolerance zero": (TOP, "step = 0.01", "tolerance = 0", ["tolerance: must be positive"]),
     "local tolerance of a fixed step": (TOP, "step = 0.01", 'step = 0.01\nmethod = "rkmk4"\nlocal_tolerance = 1e-9', ["local_tolerance: needs a method that chooses its steps", 'not "rkmk4"']),
+    "compensated sums": (TOP, "step = 0.01", "step = 0.01\ncompensated = 1", ["compensated: must be true or false, not the number 1"]),
     "local tolerance and tolerance": (TOP, "step = 0.01", 'tolerance = 1e-9\nmethod = "taylor"\nlocal_tolerance = 1e-9', ["local_tolerance: is for a run in steps"]),
     "step and tolerance": (TOP, "step = 0.01", "step = 0.01\ntolerance = 1e-9", ['"step" and "tolerance" contradict each other']),
     "every zero": (TOP, "every = 2", "every = 0", ["[output]: every: must be at least 1", "not the number 0"]),

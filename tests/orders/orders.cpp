@@ -18,8 +18,8 @@ void print_orders(const char* name, double length) {
   const System system;
 #ifdef QUICK
   const auto reference = orders::after<hamotor::Gauss8<System>>(system, length, 16);
-  orders::List<hamotor::Rkmk4, orders::Splitting4, hamotor::Gauss4>::print(name, system, length,
-                                                                           reference);
+  orders::List<orders::Rkmk4, orders::Splitting4, hamotor::Gauss4>::print(name, system, length,
+                                                                          reference);
 #else
   const auto reference = orders::after<hamotor::Gauss16<System>>(system, length, 40);
   orders::Explicit::print(name, system, length, reference);

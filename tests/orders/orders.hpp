@@ -71,6 +71,12 @@ struct List {
 };
 
 template <class System>
+using Rkmk4 = hamotor::Rkmk4<System>;
+template <class System>
+using CommutatorFree4 = hamotor::CommutatorFree4<System>;
+template <class System>
+using Rk4 = hamotor::Rk4<System>;
+template <class System>
 using Splitting2 = hamotor::Splitting<System, 2>;
 template <class System>
 using Splitting4 = hamotor::Splitting<System, 4>;
@@ -82,8 +88,7 @@ template <class System>
 using Splitting10 = hamotor::Splitting<System, 10>;
 
 using Splittings = List<Splitting2, Splitting4, Splitting6, Splitting8, Splitting10>;
-using Explicit =
-    List<hamotor::Rkmk4, hamotor::CommutatorFree4, hamotor::Rk4, hamotor::Rkmk54, hamotor::Rkmk87>;
+using Explicit = List<Rkmk4, CommutatorFree4, Rk4, hamotor::Rkmk54, hamotor::Rkmk87>;
 using Implicit =
     List<hamotor::LieMidpoint, hamotor::Gauss4, hamotor::Gauss6, hamotor::Gauss8, hamotor::Gauss12>;
 

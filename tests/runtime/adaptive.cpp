@@ -16,13 +16,15 @@
 namespace {
 
 using hamotor::Adaptive;
-using hamotor::CommutatorFree4;
 using hamotor::Rkmk54;
 using hamotor::Rkmk87;
 using hamotor::StateOf;
 using sample::distance;
 using sample::generic_state;
 using Wide = long double;
+
+template <class System>
+using CommutatorFree4 = hamotor::CommutatorFree4<System>;
 
 template <class System>
 using Of = std::remove_const_t<System>;
@@ -137,27 +139,42 @@ TEST(Pairs, meet_the_order_conditions) {
   expect_order_conditions<hamotor::PrinceDormand87>();
 }
 
-TEST(DormandPrince54, has_a_continuous_extension_of_order_4) {
-  using Pair = hamotor::DormandPrince54;
+template <class Pair>
+void expect_continuous_extension() {
   for (const Wide at : {0.1L, 0.5L, 0.9L, 1.0L}) {
-    EXPECT_LT(order_defect<Pair>(Pair::weights_at<Wide>(at), 4, at), 1e-18L);
+    const auto weights = hamotor::continuous_weights<Pair>(at);
+    EXPECT_LT(order_defect<Pair>(weights, Pair::dense_order, at), 1e-17L) << at;
+    EXPECT_GT(order_defect<Pair>(weights, Pair::dense_order + 1, at), at < 1 ? 1e-9L : 0) << at;
   }
 }
 
-TEST(Rkmk54, is_interpolated_to_order_4_within_a_step) {
-  const auto system = sample::forced_se3<Wide>();
-  using System = Of<decltype(system)>;
+TEST(Pairs, have_continuous_extensions_of_their_orders) {
+  expect_continuous_extension<hamotor::DormandPrince54>();
+  expect_continuous_extension<hamotor::PrinceDormand87>();
+}
+
+template <template <class> class Method, class System>
+void expect_order_within_a_step(const System& system, Wide h) {
   const auto start = generic_state(system);
-  const auto error = [&](Wide h) {
-    auto state = start;
-    Rkmk54<System> method;
-    method.do_step(system, state, 0, h);
-    auto reference = start;
-    Rkmk87<System> finer;
-    finer.do_step(system, reference, 0, h * 0.4L);
-    return distance(method.between(start, 0.4L), reference);
-  };
-  EXPECT_NEAR(std::log2(error(0.002L) / error(0.001L)), 5, 0.1);
+  for (const Wide at : {0.15L, 0.4L, 0.75L}) {
+    const auto error = [&](Wide length) {
+      auto state = start;
+      Method<System> method;
+      method.do_step(system, state, 0, length);
+      auto reference = start;
+      Rkmk87<System> finer;
+      for (int k = 0; k < 4; ++k) finer.do_step(system, reference, 0, length * at / 4);
+      return distance(method.between(system, start, 0, at), reference);
+    };
+    EXPECT_NEAR(std::log2(error(h) / error(h / 2)), Method<System>::dense_order + 1, 0.25)
+        << Method<System>::name << " at " << at;
+  }
+}
+
+TEST(Rkmk, is_interpolated_to_its_dense_order) {
+  expect_order_within_a_step<Rkmk54>(sample::forced_se3<Wide>(), 0.002L);
+  expect_order_within_a_step<Rkmk87>(sample::forced_se3<Wide>(), 0.04L);
+  expect_order_within_a_step<Rkmk87>(sample::two_bodies_se3<Wide>(), 0.04L);
 }
 
 TEST(Rkmk54, estimates_an_error_of_fifth_order_in_the_step) {
@@ -226,7 +243,7 @@ TEST(Adaptive, remembers_its_step_from_call_to_call) {
               0.3 * static_cast<double>(taken));
 }
 
-/// The states at the given times, and how many steps were taken.
+/// The states at the given times, and the method that took them there.
 template <class Method, class System>
 auto states_at(const System& system, const std::vector<double>& times) {
   auto state = generic_state(system);
@@ -238,17 +255,20 @@ auto states_at(const System& system, const std::vector<double>& times) {
     t = time;
     states.push_back(state);
   }
-  return std::pair{states, method.steps()};
+  return std::pair{states, method};
 }
 
 template <class Method, class System>
 void expect_output_for_nothing(const System& system) {
   std::vector<double> often;
-  for (int k = 1; k <= 400; ++k) often.push_back(k / 200.0);
+  for (int k = 1; k <= 256; ++k) often.push_back(k / 128.0);
   const auto [rare, few] = states_at<Method>(system, {1.0, 2.0});
   const auto [dense, many] = states_at<Method>(system, often);
-  EXPECT_EQ(many, few);
-  EXPECT_LT(distance(dense[399], rare[1]), 1e-15);
+  EXPECT_EQ(many.tried(), few.tried());
+  EXPECT_EQ(many.steps(), few.steps());
+  EXPECT_EQ(many.drift().sum, few.drift().sum) << "steps are the same to the last bit";
+  EXPECT_EQ(dense[127], rare[0]);
+  EXPECT_EQ(dense[255], rare[1]);
   for (const std::size_t k : {37U, 101U, 250U}) {
     Rkmk87<System> finer;
     auto reference = generic_state(system);
@@ -262,6 +282,29 @@ TEST(Adaptive, takes_no_step_more_for_states_at_more_times) {
   using System = Of<decltype(system)>;
   expect_output_for_nothing<Adaptive<System>>(system);
   expect_output_for_nothing<Adaptive<System, Rkmk87<System>>>(system);
+}
+
+TEST(Adaptive, is_the_same_after_looks_into_its_next_step) {
+  const auto system = sample::forced_se3();
+  using System = Of<decltype(system)>;
+  Adaptive<System, Rkmk87<System>> looked(1e-9);
+  auto undisturbed = looked;
+  auto state = generic_state(system);
+  auto same = state;
+  const auto start = state;
+  for (int k = 0; k < 4; ++k) {
+    for (const double part : {0.125, 0.375, 0.0625}) {
+      double work = 0;
+      const auto there = looked.look(system, state, 0.5 * k, 0.5, part, work);
+      auto reference = start;
+      Adaptive<System, Rkmk87<System>>(1e-11).do_step(system, reference, 0, 0.5 * k + part);
+      EXPECT_LT(distance(there, reference), 1e-7);
+    }
+    looked.do_step(system, state, 0.5 * k, 0.5);
+    undisturbed.do_step(system, same, 0.5 * k, 0.5);
+    EXPECT_EQ(state, same);
+  }
+  EXPECT_EQ(looked.tried(), undisturbed.tried()) << "no step is taken twice";
 }
 
 TEST(Adaptive, of_order_8_needs_fewer_evaluations_for_a_small_error) {

@@ -83,19 +83,22 @@ std::uint64_t hash_in(const System& system, const std::vector<MemberOf<System>>&
 }
 
 template <class System>
+using Rk4 = hamotor::Rk4<System>;
+template <class System>
+using Rkmk4 = hamotor::Rkmk4<System>;
+template <class System>
 using Splitting2 = hamotor::Splitting2<System>;
 
 TEST(Ensembles, members_have_the_same_bits_in_any_lane_part_and_thread) {
   const auto members = members_of(sample::forced_so3(), count);
-  const auto alone =
-      hash_in<hamotor::Rk4>(sample::forced_so3<Pack<double, 1>>(), members, 1, count);
+  const auto alone = hash_in<Rk4>(sample::forced_so3<Pack<double, 1>>(), members, 1, count);
   const auto two = sample::forced_so3<Pack<double, 2>>();
   const auto four = sample::forced_so3<Pack<double, 4>>();
   const auto eight = sample::forced_so3<Pack<double, 8>>();
-  EXPECT_EQ(hash_in<hamotor::Rk4>(two, members, 1, 1), alone);
-  EXPECT_EQ(hash_in<hamotor::Rk4>(four, members, 2, 1), alone);
-  EXPECT_EQ(hash_in<hamotor::Rk4>(eight, members, 1, 1), alone);
-  EXPECT_EQ(hash_in<hamotor::Rk4>(eight, members, 3, 2), alone);
+  EXPECT_EQ(hash_in<Rk4>(two, members, 1, 1), alone);
+  EXPECT_EQ(hash_in<Rk4>(four, members, 2, 1), alone);
+  EXPECT_EQ(hash_in<Rk4>(eight, members, 1, 1), alone);
+  EXPECT_EQ(hash_in<Rk4>(eight, members, 3, 2), alone);
 }
 
 TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
@@ -103,8 +106,8 @@ TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
   const auto alone = hash_in<Splitting2>(sample::forced_so3<Pack<double, 1>>(), members, 1, 1);
   EXPECT_EQ(hash_in<Splitting2>(sample::forced_so3<Pack<double, 4>>(), members, 2, 3), alone);
   const auto plates = members_of(sample::forced_se2(), count, 1e3);
-  const auto plate = hash_in<hamotor::Rkmk4>(sample::forced_se2<Pack<double, 1>>(), plates, 1, 1);
-  EXPECT_EQ(hash_in<hamotor::Rkmk4>(sample::forced_se2<Pack<double, 8>>(), plates, 2, 2), plate);
+  const auto plate = hash_in<Rkmk4>(sample::forced_se2<Pack<double, 1>>(), plates, 1, 1);
+  EXPECT_EQ(hash_in<Rkmk4>(sample::forced_se2<Pack<double, 8>>(), plates, 2, 2), plate);
 }
 
 template <template <class> class Method, class Packs>
@@ -123,7 +126,7 @@ void expect_bits_of_a_run(const Packs& packs) {
 }
 
 TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
-  expect_bits_of_a_run<hamotor::Rk4>(sample::forced_so3<Pack<double, 8>>());
+  expect_bits_of_a_run<Rk4>(sample::forced_so3<Pack<double, 8>>());
   expect_bits_of_a_run<Splitting2>(sample::forced_so3<Pack<double, 4>>());
 }
 
@@ -184,12 +187,12 @@ TEST(Ensembles, steps_left_open_do_not_depend_on_lanes_or_on_when_they_are_looke
 TEST(Ensembles, a_member_that_fails_keeps_its_last_state_and_the_others_go_on) {
   const auto system = sample::forced_so3<Pack<double, 8>>();
   auto members = members_of(sample::forced_so3(), count);
-  const auto unharmed = hash_in<hamotor::Rk4>(system, members, 1, 1);
+  const auto unharmed = hash_in<Rk4>(system, members, 1, 1);
   const auto far = members[9];
   members[9].momenta[0].l23 = 1e200;  // overflows in the first step
   members[20].momenta[0].l12 = 4e5;   // leaves the group at once
   members[31].momenta[0].l31 = std::numeric_limits<double>::quiet_NaN();
-  Ensemble ensemble(system, hamotor::Rk4<decltype(system)>{}, 0.0, step, std::span(members), 2);
+  Ensemble ensemble(system, Rk4<decltype(system)>{}, 0.0, step, std::span(members), 2);
   EXPECT_EQ(ensemble.advance(steps), count - 3);
   EXPECT_EQ(ensemble.failure(9), Failure::not_finite);
   EXPECT_EQ(ensemble.failure(20), Failure::left_group);
@@ -202,7 +205,7 @@ TEST(Ensembles, a_member_that_fails_keeps_its_last_state_and_the_others_go_on) {
   EXPECT_EQ(ensemble.state(20), members[20]);
 
   const auto untouched = members_of(sample::forced_so3(), count);
-  Ensemble fine(system, hamotor::Rk4<decltype(system)>{}, 0.0, step, std::span(untouched), 1);
+  Ensemble fine(system, Rk4<decltype(system)>{}, 0.0, step, std::span(untouched), 1);
   fine.advance(steps);
   Hash hash;
   for (std::size_t k = 0; k < count; ++k) {
@@ -226,7 +229,7 @@ TEST(Ensembles, the_example_of_the_documentation) {
     members[k].motors[0] = SE3::Element<double>::identity();
     members[k].momenta[0] = {0.001, 2 + 0.001 * static_cast<double>(k), 0, 1.5, 0, 0};
   }
-  Ensemble ensemble(system, hamotor::Rk4<std::remove_cvref_t<decltype(system)>>{}, 0.0, 0.01,
+  Ensemble ensemble(system, Rk4<std::remove_cvref_t<decltype(system)>>{}, 0.0, 0.01,
                     std::span(members));
   EXPECT_EQ(ensemble.advance(100), 1000U);
   EXPECT_NEAR(ensemble.state(999).momenta[0].l31, 2.999, 1e-5);

@@ -391,17 +391,6 @@ TEST(Tumble, million_steps_bound_the_energy_error_and_keep_the_angular_momentum)
   EXPECT_LT(method.drift().sum, 1e-11);
 }
 
-TEST(Tumble, compensated_sums_keep_more_digits_than_plain_ones) {
-  const auto lost = [](auto method) {
-    auto state = Tumble::start();
-    const auto momentum = spatial_momentum(state);
-    for (int k = 0; k < 200000; ++k) method.do_step(Tumble::system, state, 0, 0.001);
-    return distance(spatial_momentum(state), momentum);
-  };
-  EXPECT_LT(lost(Splitting2<Tumble::System>{}),
-            0.2 * lost(Splitting2<Tumble::System, Summation::plain>{}));
-}
-
 TEST(Drift, shows_what_renormalisation_had_to_correct) {
   const auto system = sample::forced_se3();
   using System = std::remove_const_t<decltype(system)>;

@@ -183,6 +183,8 @@ def _time(scene: Scene | GeneralScene) -> list[str]:
         lines.append(f"tolerance  {time.tolerance:g}")
     if time.local_tolerance is not None:
         lines.append(f"local tol. {time.local_tolerance:g} 1/s")
+    if time.compensated is not None:
+        lines.append(f"sums       {'compensated' if time.compensated else 'plain'}")
     return [*lines, f"method     {time.method}", f"recorded   {_recorded(scene.output)}"]
 
 

@@ -70,6 +70,7 @@ def ensemble_report(
         "asked_step": plan.asked_step,
         "steps": job.steps,
         "local_tolerance": job.tolerance,
+        "compensated": description.compensated[job.method],
         "rows": len(statistics["t"]),
         "t_end": float(statistics["t"][-1]) if len(statistics["t"]) else 0.0,
         "scalar": description.scalar.replace(" ", "_"),

@@ -196,6 +196,7 @@ def run_ensemble(
     step: float | None = None,
     local_tolerance: float | None = None,
     method: str | None = None,
+    compensated: bool | None = None,
     every: int | None = None,
     times: Sequence[float] | None = None,
     interval: float | None = None,
@@ -214,7 +215,7 @@ def run_ensemble(
     at `times` or at the multiples of `interval`, which steps must reach, statistics are taken over
     the members that are alive, and the rows of those in `keep` are kept.  With `local_tolerance`
     (1/s) methods that choose their steps do so for each member, and `step` is how often they
-    deliver the state.
+    deliver the state.  Sums over steps are `compensated` or not as in `Simulation.run`.
 
     `threads` of this machine (all if not given); or `engine` "dask" computes on the workers of
     `scheduler` (its address; without one, processes on this machine).  No result depends on either.
@@ -264,7 +265,11 @@ def run_ensemble(
             f"{simulation.name}: has events, which ensembles do not find; remove them."
         )
     compiled = simulation.compile(
-        scalar=scalar, method=chosen if simulation.methods else None, ensembles=True, progress=shown
+        scalar=scalar,
+        method=chosen if simulation.methods else None,
+        compensated=simulation.compensated if compensated is None else compensated,
+        ensembles=True,
+        progress=shown,
     )
     description = compiled.description
     if not simulation.methods:

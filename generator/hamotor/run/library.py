@@ -102,6 +102,8 @@ class Description:
     methods: Mapping[str, int]
     error_controlled: frozenset[str]
     """Methods that can choose their steps by a local tolerance."""
+    compensated: Mapping[str, bool | None]
+    """Whether a method's sums over steps are compensated; None where it has none."""
     motor: tuple[str, ...]
     momentum: tuple[str, ...]
     columns: tuple[Column, ...]
@@ -169,6 +171,7 @@ def describe(text: str) -> Description:
             bodies=tuple(said["bodies"]),
             methods={m["name"]: int(m["order"]) for m in said["methods"]},
             error_controlled=frozenset(m["name"] for m in said["methods"] if m["error_controlled"]),
+            compensated={m["name"]: m.get("compensated") for m in said["methods"]},
             motor=tuple(said["motor"]),
             momentum=tuple(said["momentum"]),
             columns=columns,

@@ -72,6 +72,7 @@ def report(
         "every": plan.every if plan.times is None else None,
         "rows": outcome.rows,
         "local_tolerance": plan.tolerance,
+        "compensated": description.compensated[plan.method],
         "own_steps": outcome.own_steps,
         "t_end": float(outcome.final[0]),
         "scalar": description.scalar.replace(" ", "_"),

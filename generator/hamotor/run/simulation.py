@@ -68,6 +68,8 @@ class Simulation:
     """Its class of `hamotor.scene.structure`, for the choice of a method."""
     local_tolerance: float | None = None
     """1/s, of the scene's method, which chooses its steps."""
+    compensated: bool | None = None
+    """Whether sums over steps are; None: as is the method's own way."""
     exact_digits: tuple[str, ...] = ()
     """The initial state in 60 digits."""
     ensemble: Ensemble = ALIKE
@@ -87,12 +89,14 @@ class Simulation:
         kernels: str = "generated",
         representation: str = "ga",
         method: str | None = None,
+        compensated: bool | None = None,
         ensembles: bool = False,
         progress: Progress | None = None,
     ) -> Compiled:
         """The scene's shared library with one method, compiled or found in the cache, and loaded.
 
-        `method` is all that the scene offers if not given.  `ensembles`: that steps many members,
+        `method` is all that the scene offers if not given, `compensated` how each sums up its
+        steps; see `run`.  `ensembles`: that steps many members,
         too.  Raises UsageError for an unknown
         scalar, kernels, representation or method, ToolError when compilation fails.
         """
@@ -119,6 +123,8 @@ class Simulation:
                     "the matrix form is stepped in double, float and long_double; "
                     f"leave --scalar {numbers.name} or --representation matrix out."
                 )
+            if compensated:
+                raise UsageError("the matrix form has plain sums; leave compensated out.")
             source = self.matrix_source(scalar)
         else:
             own_text: tuple[str, ...] = (method,) if method == "taylor" else ()
@@ -129,6 +135,8 @@ class Simulation:
             offered = self.offered(kernels, representation)
             check_method(method, self.offered_to_ensembles if ensembles else offered)
             source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
+        if compensated is not None:
+            source = f"#define HAMOTOR_COMPENSATED {str(compensated).lower()}\n{source}"
         if ensembles:
             source = f"#define HAMOTOR_ENSEMBLE\n#define HAMOTOR_FUSED\n{source}"
         generate_s = time.perf_counter() - started
@@ -162,6 +170,7 @@ class Simulation:
         tolerance: float | None = None,
         local_tolerance: float | None = None,
         method: str | None = None,
+        compensated: bool | None = None,
         every: int | None = None,
         times: Sequence[float] | None = None,
         interval: float | None = None,
@@ -186,6 +195,10 @@ class Simulation:
         to its initial norm.  `local_tolerance` (1/s) is, for methods that choose their steps, the
         error they allow themselves per second; nothing is verified, and `step` is how often they
         deliver the state (a thousandth of `end` if not given).
+
+        `compensated` sums over steps keep the digits that each addition would lose, so that
+        rounding errors are of what changes; if neither this nor the scene says, where that costs
+        the method less than a tenth.
 
         Every `every`-th step is recorded, and always the first and the last state; with a
         tolerance, where the scene cannot know the steps, about two thousand rows if not given.
@@ -243,6 +256,8 @@ class Simulation:
         if methods:
             # Before the compiler runs: a slip of the pen should not take seconds to come back.
             chosen, reason = choose_method(chosen, methods, tolerance, self.structure)
+        if compensated is None and representation != "matrix":  # which has plain sums only
+            compensated = self.compensated
         folder = None if out is None else RunFolder(out)
         shown = _progress(progress)
         compiled = self.compile(
@@ -250,6 +265,7 @@ class Simulation:
             kernels=kernels,
             representation=representation,
             method=chosen,
+            compensated=compensated,
             progress=shown,
         )
         description = compiled.library.description
@@ -408,6 +424,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
             "step": found.time.step,
             "tolerance": found.time.tolerance,
             "local_tolerance": found.time.local_tolerance,
+            "compensated": found.time.compensated,
             "method": found.time.method,
             "every": found.output.every,
             "times": found.output.times,

@@ -109,6 +109,9 @@ class Time:
     """`auto`, or a method's name."""
     local_tolerance: float | None = None
     """Of a method that chooses its steps, 1/s; beside a step, at which it delivers the state."""
+    compensated: bool | None = None
+    """Whether sums over steps keep the digits that each addition would lose; None: as is the
+    method's own way."""
 
 
 @dataclass(frozen=True)

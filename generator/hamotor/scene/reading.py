@@ -571,6 +571,7 @@ def _time(table: Table) -> Time:
         tolerance=tolerance,
         method=method,
         local_tolerance=_local_tolerance(table, method) if table.has("local_tolerance") else None,
+        compensated=table.flag("compensated") if table.has("compensated") else None,
     )
 
 

@@ -497,6 +497,14 @@ TIME = Section(
             example="1e-10",
             active=False,
         ),
+        Key(
+            "compensated",
+            "flag",
+            "whether sums over steps keep the digits that each addition would lose; left out: where"
+            " that costs the method little",
+            example="true",
+            active=False,
+        ),
     ),
 )
 

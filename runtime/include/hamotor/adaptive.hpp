@@ -14,9 +14,8 @@ namespace hamotor {
 /// A pair with an error estimate, in steps that keep it below `tolerance` a unit of time (s⁻¹).
 ///
 /// The steps are the pair's own, whatever times are asked for: a state within the last of them is
-/// interpolated (dense output, of order 4) where the pair can, so that it costs nothing; where it
-/// cannot, one step leads there from the last one's start.  A state that is not the one delivered
-/// before, or a time that is not, starts anew.  Without a tolerance it is the method itself, one
+/// interpolated (dense output).  A state that is not the one delivered before, or a time that is
+/// not, starts anew.  Without a tolerance it is the method itself, one
 /// step a call.  The state becomes not a number where a step would have to be shorter than rounding
 /// of the time it is part of.
 template <class System, class Method = Rkmk54<System>>
@@ -26,6 +25,8 @@ class Adaptive {
  public:
   static constexpr int order = Method::order;
   static constexpr std::string_view name = Method::name;
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = Method::compensated;
 
   constexpr Adaptive() noexcept = default;
   constexpr explicit Adaptive(const S& tolerance) noexcept : tolerance_(tolerance) {}
@@ -44,19 +45,30 @@ class Adaptive {
       ++taken_;
       return;
     }
+    reach(system, state, t, h, t + h);
+  }
+
+  /// The state after the part `part` of a step from `state`, t to t + h, and the work done until
+  /// then; that step may follow as if this had not been asked.  What has to be found for it is kept
+  /// for the step, so that it is found once.
+  constexpr StateOf<System> look(const System& system, const StateOf<System>& state, const S& t,
+                                 const S& h, const S& part, S& work) noexcept {
+    StateOf<System> there = state;
+    const S target = t + part;
     const S direction = scalar::sign(h);
-    const S target = t + h;
-    if (!goes_on(state, t, direction)) start(system, state, t, h);
-    // Times that differ by rounding are the same.
-    const S slack = S(4) * scalar::Limits<S>::epsilon() * scalar::max_abs(target, ahead_.time, h);
-    while (direction * (target - ahead_.time) > slack) {
-      if (!advance(system, h)) {
-        for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
-        delivered_ = state;
-        return;
-      }
+    if (!(tolerance_ > S(0)) || direction * (target - before_.time) < S(0)) {
+      Adaptive aside = *this;
+      aside.do_step(system, there, t, part);
+      work = aside.work_;
+      return there;
     }
-    deliver(system, state, target, slack);
+    const S work_before = work_;
+    reach(system, there, t, h, target);
+    work = work_;
+    work_ = work_before;
+    delivered_ = state;
+    delivered_time_ = t;
+    return there;
   }
 
   /// How far the steps so far left the group.
@@ -86,6 +98,24 @@ class Adaptive {
     Method method{};
   };
 
+  /// Takes `state` from t to the target, by steps that are those of h.
+  constexpr void reach(const System& system, StateOf<System>& state, const S& t, const S& h,
+                       const S& target) noexcept {
+    const S direction = scalar::sign(h);
+    const bool is_past = direction * (target - before_.time) < S(0);
+    if (is_past || !goes_on(state, t, direction)) start(system, state, t, h);
+    // Times that differ by rounding are the same.
+    const S slack = S(4) * scalar::Limits<S>::epsilon() * scalar::max_abs(target, ahead_.time, h);
+    while (direction * (target - ahead_.time) > slack) {
+      if (!advance(system, h)) {
+        for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+        delivered_ = state;
+        return;
+      }
+    }
+    deliver(system, state, target, slack);
+  }
+
   [[nodiscard]] constexpr bool goes_on(const StateOf<System>& state, const S& t,
                                        const S& direction) const noexcept {
     const S slack = S(64) * scalar::Limits<S>::epsilon() * scalar::max_abs(t, ahead_.time);
@@ -99,6 +129,7 @@ class Adaptive {
                        const S& h) noexcept {
     ahead_.time = t;
     ahead_.state = state;
+    ahead_.method.forget();
     const auto slope = detail::slope_of(system, state, t);
     proposed_ = h;
     for (std::size_t i = 0; i < System::bodies; ++i) {
@@ -146,21 +177,16 @@ class Adaptive {
 
   constexpr void deliver(const System& system, StateOf<System>& state, const S& target,
                          const S& slack) noexcept {
-    const S step = ahead_.time - before_.time;
     if (scalar::abs(ahead_.time - target) <= slack) {
       state = ahead_.state;
       if constexpr (PoweredSystem<System>) work_ = ahead_.method.work();
-    } else if constexpr (Method::is_dense) {
-      const S at = (target - before_.time) / step;
-      state = ahead_.method.between(before_.state, at);
-      if constexpr (PoweredSystem<System>) {
-        work_ = ahead_.method.work() - ahead_.method.work_after(at);
-      }
     } else {
-      Method method = before_.method;
-      state = before_.state;
-      method.do_step(system, state, before_.time, target - before_.time);
-      if constexpr (PoweredSystem<System>) work_ = method.work();
+      Method& method = ahead_.method;
+      const S at = (target - before_.time) / (ahead_.time - before_.time);
+      state = method.between(system, before_.state, before_.time, at);
+      if constexpr (PoweredSystem<System>) {
+        work_ = method.work() - method.work_after(system, before_.state, before_.time, at);
+      }
     }
     delivered_ = state;
     delivered_time_ = target;
@@ -175,7 +201,7 @@ class Adaptive {
     return select(factor < S(0.2), S(0.2), select(factor > S(5), S(5), factor));
   }
 
-  Mark before_;  ///< where the last step began
+  Mark before_;  ///< where the last step began; its method is not used
   Mark ahead_;   ///< where it ended: at the delivered time or later
   StateOf<System> delivered_{};
   S delivered_time_ = S(0);

@@ -3,14 +3,71 @@
 
 #include <array>
 #include <cstddef>
+#include <tuple>
+#include <type_traits>
 
 #include "hamotor/scalar.hpp"
 #include "hamotor/state.hpp"
-#include "hamotor/steppers.hpp"
 
 namespace hamotor {
 
+/// Whether a sum over steps carries the digits that each addition would lose.
+enum class Summation { plain, compensated };
+
 namespace detail {
+
+/// Adds `change` to `value`; `low` holds what does not fit (Neumaier 1974), so that a rounding
+/// error is made in the change only.
+template <class T>
+constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
+  auto sum = value.components();
+  auto lost = low.components();
+  const auto add = change.components();
+  for (std::size_t k = 0; k < sum.size(); ++k) {
+    const auto pair = scalar::two_sum(sum[k], add[k] + lost[k]);
+    sum[k] = pair.hi;
+    lost[k] = pair.lo;
+  }
+  value = T::from(sum);
+  low = T::from(lost);
+}
+
+/// Largest absolute coefficient of M M~ − 1.
+template <class Defect>
+[[nodiscard]] constexpr typename Defect::Scalar size(const Defect& defect) noexcept {
+  return std::apply([](const auto&... x) { return scalar::max_abs(x...); }, defect.components());
+}
+
+/// M M~ − 1, rounded as its terms are: for steppers that round M itself in every step.  Products by
+/// table have no other.
+template <class Motor>
+[[nodiscard]] HAMOTOR_INLINE constexpr auto rounded_defect(const Motor& m) noexcept {
+  using S = typename Motor::Scalar;
+  using Defect = decltype(unit_defect_change(m, m));
+  if constexpr (requires { Defect::names; }) {
+    auto defect = unit_defect_change(m, m).components();
+    static_assert(Defect::names[0] == "s");
+    defect[0] = mul_add(S(0.5), defect[0], S(-1));
+    for (std::size_t k = 1; k < defect.size(); ++k) defect[k] = S(0.5) * defect[k];
+    return Defect::from(defect);
+  } else {
+    return unit_defect(m);
+  }
+}
+
+template <class S>
+constexpr void record(Drift<S>& drift, const S& defect) noexcept {
+  drift.largest = select(defect > drift.largest, defect, drift.largest);
+  drift.sum = drift.sum + defect;
+}
+
+/// The largest of all bodies' defects.
+template <class S, std::size_t N>
+constexpr void record(Drift<S>& drift, const std::array<S, N>& defects) noexcept {
+  S worst = defects[0];
+  for (std::size_t i = 1; i < N; ++i) worst = select(worst > defects[i], worst, defects[i]);
+  record(drift, worst);
+}
 
 /// Largest absolute component.
 template <class T>
@@ -66,8 +123,9 @@ template <class Momentum, class Rate>
 }  // namespace detail
 
 /// What a state's numbers do not hold of it: a sum over steps is then rounded as if in twice the
-/// precision (Neumaier 1974), and what a step rounds is relative to its change.
-template <class System>
+/// precision (Neumaier 1974), and what a step rounds is relative to its change.  Of plain sums,
+/// nothing.
+template <class System, Summation summation = Summation::compensated>
 class LowDigits {
   using S = typename System::Scalar;
 
@@ -78,18 +136,29 @@ class LowDigits {
     S worst(0);
     for (std::size_t i = 0; i < System::bodies; ++i) {
       auto& motor = state.motors[i];
-      detail::add_compensated(motor, motors_[i], change.motors[i]);
-      const auto defect = unit_defect(motor) + unit_defect_change(motor, motors_[i]);
-      worst = scalar::max_abs(worst, detail::size(defect));
-      detail::add_compensated(motor, motors_[i], unit_correction(motor, defect));
-      detail::add_compensated(state.momenta[i], momenta_[i], change.momenta[i]);
+      auto& momentum = state.momenta[i];
+      if constexpr (summation == Summation::compensated) {
+        auto& low = kept_.motors[i];
+        detail::add_compensated(motor, low, change.motors[i]);
+        const auto defect = unit_defect(motor) + unit_defect_change(motor, low);
+        worst = scalar::max_abs(worst, detail::size(defect));
+        detail::add_compensated(motor, low, unit_correction(motor, defect));
+        detail::add_compensated(momentum, kept_.momenta[i], change.momenta[i]);
+      } else {
+        motor = motor + change.motors[i];
+        const auto defect = detail::rounded_defect(motor);
+        worst = scalar::max_abs(worst, detail::size(defect));
+        motor = motor + unit_correction(motor, defect);
+        momentum = momentum + change.momenta[i];
+      }
     }
     return worst;
   }
 
  private:
-  decltype(StateOf<System>::motors) motors_{};
-  decltype(StateOf<System>::momenta) momenta_{};
+  struct Nothing {};
+  [[no_unique_address]] std::conditional_t<summation == Summation::compensated, ChangeOf<System>,
+                                           Nothing> kept_{};
 };
 
 }  // namespace hamotor

@@ -44,21 +44,27 @@ concept SystemInSpace = requires { Space<typename System::Group>::dimension; };
 
 /// The methods that step all lanes of a pack at once: those with nothing to wait for.  The others
 /// choose their own steps or iterate until they have converged.
-template <class System>
+template <class System, Summation... asked>
 struct PackSteppers {
-  using type = std::tuple<Rk4<System>>;
+  using type = std::tuple<Rk4<System, asked...>>;
 };
-template <SystemInSpace System>
-struct PackSteppers<System> {
-  using type = std::tuple<Rk4<System>, Rkmk4<System>, CommutatorFree4<System>>;
-};
-template <SystemInSpace System>
-  requires SplitSystem<System>
-struct PackSteppers<System> {
+template <SystemInSpace System, Summation... asked>
+struct PackSteppers<System, asked...> {
+  // exp X − 1, which compensated sums take, is a series as long as it needs.
+  using Turning = std::conditional_t<((asked == Summation::compensated) || ...), std::tuple<>,
+                                     std::tuple<Rkmk4<System>, CommutatorFree4<System>>>;
   using type =
-      std::tuple<Rk4<System>, Rkmk4<System>, CommutatorFree4<System>, Splitting2<System>,
-                 Splitting4<System>, Splitting6<System>, Splitting8<System>, Splitting10<System>>;
+      decltype(std::tuple_cat(std::tuple<Rk4<System, asked...>>{}, Turning{},
+                              typename hamotor::detail::SplitSteppers<System, asked...>::type{}));
 };
+
+#ifdef HAMOTOR_COMPENSATED
+template <class System>
+using MembersPacked = typename PackSteppers<System, summation_asked>::type;
+#else
+template <class System>
+using MembersPacked = typename PackSteppers<System>::type;
+#endif
 
 template <class Methods>
 inline constexpr auto names_of = std::tuple<>{};
@@ -269,19 +275,18 @@ template <class Scene>
         using One = Pack<S, 1>;
         using WideSystem = SystemOf<typename Scene::template In<Wide>>;
         using OneSystem = SystemOf<typename Scene::template In<One>>;
-        using Packed = typename PackSteppers<WideSystem>::type;
+        using Packed = MembersPacked<WideSystem>;
         if (lanes == 0 || lanes == static_cast<std::int32_t>(widest<S>)) {
           start(std::type_identity<Wide>{}, std::type_identity<Packed>{});
         } else if (lanes == 1) {
-          start(std::type_identity<One>{},
-                std::type_identity<typename PackSteppers<OneSystem>::type>{});
+          start(std::type_identity<One>{}, std::type_identity<MembersPacked<OneSystem>>{});
         }
         if (lanes <= 1) {
           start(std::type_identity<S>{},
-                std::type_identity<typename Others<SteppersOf<System>, Packed>::type>{});
+                std::type_identity<typename Others<CompiledSteppers<System>, Packed>::type>{});
         }
       } else if (lanes == 0 || lanes == 1) {
-        start(std::type_identity<S>{}, std::type_identity<SteppersOf<System>>{});
+        start(std::type_identity<S>{}, std::type_identity<CompiledSteppers<System>>{});
       }
       return started.release();
     } catch (const std::exception&) {

@@ -49,7 +49,8 @@ namespace detail {
 /// of all stages together (up to 96 unknowns).  What stopped them is held against what rounding of
 /// the stages does to ξ̇ and ṁ.  Where they settle nowhere else, or not in 20 iterations and one a
 /// bit, the state becomes not a number.
-template <HamiltonianSystem System, std::size_t stages>
+template <HamiltonianSystem System, std::size_t stages,
+          Summation summation = Summation::compensated>
 class Gauss {
   static_assert(stages >= 1 && stages <= 8);
   using S = typename System::Scalar;
@@ -71,6 +72,8 @@ class Gauss {
  public:
   static constexpr int order = 2 * static_cast<int>(stages);
   static constexpr std::string_view name = detail::gauss_name(stages);
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = summation == Summation::compensated;
 
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
@@ -695,7 +698,7 @@ class Gauss {
   S h_{};
   StateOf<System> end_{};  ///< what the last step left
   [[no_unique_address]] std::conditional_t<has_newton, Newton, NoNewton> newton_;
-  LowDigits<System> low_;
+  [[no_unique_address]] LowDigits<System, summation> low_;
   Drift<S> drift_;
   S work_{};
   Failure failure_ = Failure::none;

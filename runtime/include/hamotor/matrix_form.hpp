@@ -158,6 +158,7 @@ void orthonormalise(Matrix& r, S& worst) noexcept {
 template <class S>
 class Account {
  public:
+  static constexpr bool compensated = false;
   /// How far the steps so far left the rotations.
   [[nodiscard]] const Drift<S>& drift() const noexcept { return drift_; }
   /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
@@ -654,8 +655,8 @@ class Run {
 
 namespace hamotor::detail {
 
-template <matrix_form::MatrixSystem System>
-struct Steppers<System> {
+template <matrix_form::MatrixSystem System, Summation... asked>
+struct Steppers<System, asked...> {
   using type = std::tuple<matrix_form::Rkmk4<System>, matrix_form::Rk4<System>>;
 };
 

@@ -16,50 +16,64 @@ namespace hamotor {
 
 namespace detail {
 
-template <class System>
+// Of steppers whose sums over steps are plain or compensated as asked; nothing asked, as is each
+// one's own way.
+
+template <class System, Summation... asked>
 struct Steppers {
-  using type = std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
-                          CommutatorFree4<System>, Rk4<System>, LieMidpoint<System>, Gauss4<System>,
-                          Gauss6<System>, Gauss8<System>, Gauss12<System>, Gauss16<System>>;
-};
-template <SplitSystem System>
-struct Steppers<System> {
   using type =
-      std::tuple<Rkmk4<System>, Adaptive<System>, Adaptive<System, Rkmk87<System>>,
-                 CommutatorFree4<System>, Rk4<System>, Splitting2<System>, Splitting4<System>,
-                 Splitting6<System>, Splitting8<System>, Splitting10<System>, LieMidpoint<System>,
-                 Gauss4<System>, Gauss6<System>, Gauss8<System>, Gauss12<System>, Gauss16<System>>;
+      std::tuple<Rkmk4<System, asked...>, Adaptive<System, Rkmk<System, DormandPrince54, asked...>>,
+                 Adaptive<System, Rkmk<System, PrinceDormand87, asked...>>,
+                 CommutatorFree4<System, asked...>, Rk4<System, asked...>,
+                 Gauss<System, 1, asked...>, Gauss<System, 2, asked...>, Gauss<System, 3, asked...>,
+                 Gauss<System, 4, asked...>, Gauss<System, 6, asked...>,
+                 Gauss<System, 8, asked...>>;
 };
 
-template <class System>
+template <class System, Summation... asked>
+struct SplitSteppers {
+  using type = std::tuple<>;
+};
+template <SplitSystem System, Summation... asked>
+struct SplitSteppers<System, asked...> {
+  using type = std::tuple<Splitting<System, 2, asked...>, Splitting<System, 4, asked...>,
+                          Splitting<System, 6, asked...>, Splitting<System, 8, asked...>,
+                          Splitting<System, 10, asked...>>;
+};
+
+template <class System, Summation... asked>
 struct RigidSteppers {
   using type = std::tuple<>;
 };
-template <RigidSystem System>
-struct RigidSteppers<System> {
-  using type = std::tuple<MoserVeselov<System, 2>>;
+template <RigidSystem System, Summation... asked>
+struct RigidSteppers<System, asked...> {
+  using type = std::tuple<MoserVeselov<System, 2, asked...>>;
 };
-template <FreeSystem System>
-struct RigidSteppers<System> {
-  using type = std::tuple<MoserVeselov<System, 2>, MoserVeselov<System, 4>, MoserVeselov<System, 6>,
-                          MoserVeselov<System, 8>, MoserVeselov<System, 10>, ClosedForm<System>>;
+template <FreeSystem System, Summation... asked>
+struct RigidSteppers<System, asked...> {
+  using type = std::tuple<MoserVeselov<System, 2, asked...>, MoserVeselov<System, 4, asked...>,
+                          MoserVeselov<System, 6, asked...>, MoserVeselov<System, 8, asked...>,
+                          MoserVeselov<System, 10, asked...>, ClosedForm<System>>;
 };
 
-template <class System>
+template <class System, Summation... asked>
 struct SeriesSteppers {
   using type = std::tuple<>;
 };
-template <AnalyticSystem System>
-struct SeriesSteppers<System> {
-  using type = std::tuple<Taylor<System>>;
+template <AnalyticSystem System, Summation... asked>
+struct SeriesSteppers<System, asked...> {
+  using type = std::tuple<Taylor<System, asked...>>;
 };
 
 }  // namespace detail
 
-/// The steppers that a system can be stepped with.
-template <class System>
-using SteppersOf = decltype(std::tuple_cat(typename detail::Steppers<System>::type{},
-                                           typename detail::RigidSteppers<System>::type{},
-                                           typename detail::SeriesSteppers<System>::type{}));
+/// The steppers that a system can be stepped with; `asked` is at most one `Summation`, for all that
+/// have sums over steps.
+template <class System, Summation... asked>
+using SteppersOf =
+    decltype(std::tuple_cat(typename detail::Steppers<System, asked...>::type{},
+                            typename detail::SplitSteppers<System, asked...>::type{},
+                            typename detail::RigidSteppers<System, asked...>::type{},
+                            typename detail::SeriesSteppers<System, asked...>::type{}));
 
 }  // namespace hamotor

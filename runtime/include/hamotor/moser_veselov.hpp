@@ -381,7 +381,7 @@ class FreelyStepped {
 /// conserves, and the motion of the momenta is a Poisson map, but that of the whole state is not
 /// symplectic. A step that turns a body too far for the equation to have a solution (h Π/2J of
 /// about 1) fails.
-template <RigidSystem System, int nominal_order>
+template <RigidSystem System, int nominal_order, Summation summation = Summation::compensated>
   requires(nominal_order == 2 || FreeSystem<System>)
 class MoserVeselov {
   using S = typename System::Scalar;
@@ -391,6 +391,8 @@ class MoserVeselov {
  public:
   static constexpr int order = nominal_order;
   static constexpr std::string_view name = detail::moser_veselov::name_of(nominal_order);
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = summation == Summation::compensated;
 
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
@@ -433,7 +435,7 @@ class MoserVeselov {
   }
 
   typename Stepped::Rotations rotations_{};
-  Splitting<Stepped, 2> splitting_;
+  Splitting<Stepped, 2, summation> splitting_;
   decltype(StateOf<System>::momenta) delivered_{};
   S set_up_for_{};
   Failure failure_ = Failure::none;

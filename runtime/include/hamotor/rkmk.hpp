@@ -62,105 +62,67 @@ template <class System>
 }  // namespace detail
 
 /// Runge–Kutta–Munthe-Kaas by an embedded pair: an explicit method for X in M = M₀ exp X and for μ,
-/// and the error of the lower order (Munthe-Kaas 1999).  Not symplectic.  Sums are compensated
-/// where steps are long enough for it to cost little.
-template <HamiltonianSystem System, class Pair,
-          Summation summation = (Pair::order > 5) ? Summation::compensated : Summation::plain>
-class Rkmk {
-  using S = typename System::Scalar;
-  using G = typename System::Group;
-  using Rate = typename G::template Rate<S>;
-  using Momentum = typename G::template Momentum<S>;
-  static constexpr std::size_t n = System::bodies;
+/// and the error of the lower order (Munthe-Kaas 1999).  Not symplectic.
+template <HamiltonianSystem System, class Pair, Summation summation = Summation::compensated>
+class Rkmk : public detail::ExplicitMethod<System, summation> {
+  using Base = detail::ExplicitMethod<System, summation>;
+  using Base::n;
+  using typename Base::Rates;
+  using typename Base::S;
   static constexpr std::size_t stages = Pair::stages;
-  static constexpr bool compensated = summation == Summation::compensated;
+  static constexpr std::size_t all_stages = Pair::dense_stages;
 
  public:
   static constexpr int order = Pair::order;
   static constexpr int lower_order = Pair::lower_order;
   static constexpr std::string_view name = Pair::name;
-  /// Whether `between` gives the motion within the last step.
-  static constexpr bool is_dense = requires { Pair::template weights_at<S>(S(0)); };
+  /// The local error of `between` is of this order in the step, and one more.
+  static constexpr int dense_order = Pair::dense_order;
 
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
     h_ = h;
-    std::array<Rate, n> x{};
-    StateOf<System> there = state;
-    for (std::size_t s = 0; s < stages; ++s) {
-      if (s > 0) {
-        const Sum sum = combined(table.rows[s], s);
-        x = sum.rates;
-        for (std::size_t i = 0; i < n; ++i) {
-          there.momenta[i] = state.momenta[i] + sum.forces[i];
-          there.motors[i] = gp(state.motors[i], exp(x[i]));
-        }
-      }
-      slopes_[s] = detail::slope_of(system, there, mul_add(table.nodes[s], h, t));
-      for (std::size_t i = 0; i < n && s > 0; ++i) {
-        slopes_[s].rates[i] = detail::dexp_inverse_series<order>(x[i], slopes_[s].rates[i]);
-      }
-    }
-    const Sum sum = combined(table.weights, stages);
-    const S worst = move(state, sum);
-    work_ = work_ + sum.power;
-    error_ = error_of(state, combined(table.error, stages));
-    detail::record(drift_, worst);
+    known_ = 0;
+    find_slopes(system, state, t, stages);
+    const Sum sum = combined(table.weights);
+    this->turn(state, S(1), sum.forces, sum.power, sum.rates);
+    error_ = error_of(state, combined(table.error));
   }
 
-  /// The state at the fraction `at` of the last step, which began at `start`; of order 4.
-  [[nodiscard]] constexpr StateOf<System> between(const StateOf<System>& start,
-                                                  const S& at) const noexcept
-    requires(is_dense)
-  {
-    const Sum sum = combined(Pair::template weights_at<S>(at), stages);
-    StateOf<System> there = start;
-    for (std::size_t i = 0; i < n; ++i) {
-      auto& motor = there.motors[i];
-      motor = gp(motor, exp(sum.rates[i]));
-      motor = motor + unit_correction(motor, unit_defect(motor));
-      there.momenta[i] = there.momenta[i] + sum.forces[i];
-    }
-    return there;
+  /// The state at the fraction `at` of the last step, which began at `start` and t; of order
+  /// `dense_order`.  What that takes beyond the step's own evaluations is evaluated once.
+  [[nodiscard]] constexpr StateOf<System> between(const System& system,
+                                                  const StateOf<System>& start, const S& t,
+                                                  const S& at) noexcept {
+    find_slopes(system, start, t, all_stages);
+    return moved(start, combined(continuous_weights<Pair>(at)));
   }
 
-  /// ∫ dH/dt dt from the fraction `at` of the last step to its end, J.
-  [[nodiscard]] constexpr S work_after(const S& at) const noexcept
-    requires(is_dense)
-  {
-    return combined(table.weights, stages).power -
-           combined(Pair::template weights_at<S>(at), stages).power;
+  /// ∫ dH/dt dt from the fraction `at` of the last step to its end, J; as `between`.
+  [[nodiscard]] constexpr S work_after(const System& system, const StateOf<System>& start,
+                                       const S& t, const S& at) noexcept {
+    find_slopes(system, start, t, all_stages);
+    return combined(table.weights).power - combined(continuous_weights<Pair>(at)).power;
   }
 
   /// The estimated error of the last step, by the embedded method: the largest of a motor's
   /// component, and of a momentum's relative to the largest component of it.
   [[nodiscard]] constexpr const S& error() const noexcept { return error_; }
 
-  /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
-
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
-  [[nodiscard]] constexpr const S& work() const noexcept
-    requires PoweredSystem<System>
-  {
-    return work_;
-  }
-
  private:
-  struct Nothing {};
   using Sum = detail::Slope<System>;
 
   /// The pair's numbers, rounded to S once.
   struct Table {
-    std::array<std::array<S, stages>, stages> rows{};
-    std::array<S, stages> nodes{};
+    std::array<std::array<S, all_stages>, all_stages> rows{};
+    std::array<S, all_stages> nodes{};
     std::array<S, stages> weights = detail::numbers<S>(Pair::weights);
     std::array<S, stages> error = detail::numbers<S>(Pair::error);
 
     constexpr Table() noexcept {
       using Wide = detail::CoefficientScalar<S>;
-      for (std::size_t s = 0; s < stages; ++s) {
+      for (std::size_t s = 0; s < all_stages; ++s) {
         rows[s] = detail::numbers<S>(Pair::rows[s]);
         Wide node(0);
         for (const auto& x : detail::numbers<Wide>(Pair::rows[s])) node = node + x;
@@ -170,9 +132,33 @@ class Rkmk {
   };
   static inline const Table table{};
 
+  /// Finds the slopes of a step from `start` at t that are not known yet, up to so many stages.
+  constexpr void find_slopes(const System& system, const StateOf<System>& start, const S& t,
+                             std::size_t count) noexcept {
+    for (std::size_t s = known_; s < count; ++s) {
+      Sum& slope = slopes_[s];
+      if (s == 0) {
+        slope = detail::slope_of(system, start, t);
+        continue;
+      }
+      const Sum sum = combined(table.rows[s], s);
+      StateOf<System> there = start;
+      for (std::size_t i = 0; i < n; ++i) {
+        there.momenta[i] = start.momenta[i] + sum.forces[i];
+        there.motors[i] = gp(start.motors[i], exp(sum.rates[i]));
+      }
+      slope = detail::slope_of(system, there, mul_add(table.nodes[s], h_, t));
+      for (std::size_t i = 0; i < n; ++i) {
+        slope.rates[i] = detail::dexp_inverse_series<order>(sum.rates[i], slope.rates[i]);
+      }
+    }
+    if (known_ < count) known_ = count;
+  }
+
   /// h Σ c_r slope_r over the first `count` stages.
-  [[nodiscard]] constexpr Sum combined(const std::array<S, stages>& c,
-                                       std::size_t count) const noexcept {
+  template <std::size_t size>
+  [[nodiscard]] constexpr Sum combined(const std::array<S, size>& c,
+                                       std::size_t count = size) const noexcept {
     Sum sum{};
     for (std::size_t r = 0; r < count; ++r) {
       if (c[r] == S(0)) continue;
@@ -186,26 +172,16 @@ class Rkmk {
     return sum;
   }
 
-  /// Moves the state by X and μ; returns how far it left the group.
-  [[nodiscard]] constexpr S move(StateOf<System>& state, const Sum& by) noexcept {
-    if constexpr (compensated) {
-      ChangeOf<System> change{{}, by.forces};
-      for (std::size_t i = 0; i < n; ++i) {
-        change.motors[i] = detail::motor_change(state.motors[i], by.rates[i]);
-      }
-      return low_.add(state, change);
-    } else {
-      S worst(0);
-      for (std::size_t i = 0; i < n; ++i) {
-        auto& motor = state.motors[i];
-        motor = gp(motor, exp(by.rates[i]));
-        const auto defect = unit_defect(motor);
-        worst = scalar::max_abs(worst, detail::size(defect));
-        motor = motor + unit_correction(motor, defect);
-        state.momenta[i] = state.momenta[i] + by.forces[i];
-      }
-      return worst;
+  [[nodiscard]] static constexpr StateOf<System> moved(const StateOf<System>& start,
+                                                       const Sum& by) noexcept {
+    StateOf<System> there = start;
+    for (std::size_t i = 0; i < n; ++i) {
+      auto& motor = there.motors[i];
+      motor = gp(motor, exp(by.rates[i]));
+      motor = motor + unit_correction(motor, unit_defect(motor));
+      there.momenta[i] = there.momenta[i] + by.forces[i];
     }
+    return there;
   }
 
   [[nodiscard]] static constexpr S error_of(const StateOf<System>& state, const Sum& by) noexcept {
@@ -219,30 +195,33 @@ class Rkmk {
     return worst;
   }
 
-  std::array<Sum, stages> slopes_{};
+  std::array<Sum, all_stages> slopes_{};
+  std::size_t known_ = 0;  ///< how many of them
   S h_{};
-  [[no_unique_address]] std::conditional_t<compensated, LowDigits<System>, Nothing> low_;
-  Drift<S> drift_;
   S error_ = S(0);
-  S work_{};
 };
 
-/// Order 5 with an error of order 4: seven evaluations a step.
+/// Order 5 with an error of order 4: seven evaluations a step, within which it is of order 4.
 template <HamiltonianSystem System>
 using Rkmk54 = Rkmk<System, DormandPrince54>;
-/// Order 8 with an error of order 7: thirteen evaluations a step.
+/// Order 8 with an error of order 7: thirteen evaluations a step, within which it is of order 7 by
+/// five more.
 template <HamiltonianSystem System>
 using Rkmk87 = Rkmk<System, PrinceDormand87>;
 
 /// Commutator-free method of order 4: products of exponentials in place of brackets, two for the
 /// last half of a step (Celledoni, Marthinsen & Owren 2003).  Four evaluations a step; not
 /// symplectic.
-template <HamiltonianSystem System>
-class CommutatorFree4 {
-  using S = typename System::Scalar;
-  using Rate = typename System::Group::template Rate<S>;
+template <HamiltonianSystem System, Summation summation = Summation::plain>
+class CommutatorFree4 : public detail::ExplicitMethod<System, summation> {
+  using Base = detail::ExplicitMethod<System, summation>;
+  using Base::mean;
+  using Base::n;
+  using typename Base::Momenta;
+  using typename Base::Rate;
+  using typename Base::Rates;
+  using typename Base::S;
   using Slope = detail::Slope<System>;
-  static constexpr std::size_t n = System::bodies;
 
  public:
   static constexpr int order = 4;
@@ -263,34 +242,17 @@ class CommutatorFree4 {
     }
     const Slope four = detail::slope_of(system, there, t + h);
 
-    S worst(0);
+    Rates first{};
+    Rates second{};
+    Momenta forces{};
     for (std::size_t i = 0; i < n; ++i) {
       const Rate inner = S(2) * (two.rates[i] + three.rates[i]);
-      auto& motor = state.motors[i];
-      motor = gp(motor, exp((h / S(12)) * (mul_add(S(3), one.rates[i], inner) - four.rates[i])));
-      motor = gp(motor, exp((h / S(12)) * (mul_add(S(3), four.rates[i], inner) - one.rates[i])));
-      const auto defect = unit_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
-      motor = motor + unit_correction(motor, defect);
-      state.momenta[i] = mul_add(
-          h / S(6), mul_add(S(2), two.forces[i] + three.forces[i], one.forces[i] + four.forces[i]),
-          state.momenta[i]);
+      first[i] = (h / S(12)) * (mul_add(S(3), one.rates[i], inner) - four.rates[i]);
+      second[i] = (h / S(12)) * (mul_add(S(3), four.rates[i], inner) - one.rates[i]);
+      forces[i] = mean(one.forces[i], two.forces[i], three.forces[i], four.forces[i]);
     }
-    if constexpr (PoweredSystem<System>) {
-      work_ =
-          mul_add(h / S(6), mul_add(S(2), two.power + three.power, one.power + four.power), work_);
-    }
-    detail::record(drift_, worst);
-  }
-
-  /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
-
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
-  [[nodiscard]] constexpr const S& work() const noexcept
-    requires PoweredSystem<System>
-  {
-    return work_;
+    this->turn(state, h / S(6), forces, mean(one.power, two.power, three.power, four.power), first,
+               second);
   }
 
  private:
@@ -303,9 +265,6 @@ class CommutatorFree4 {
     }
     return there;
   }
-
-  Drift<S> drift_;
-  S work_{};
 };
 
 }  // namespace hamotor

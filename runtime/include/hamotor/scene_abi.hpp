@@ -344,7 +344,8 @@ struct MethodTable<std::tuple<Method...>, S> {
     JsonList list;
     (list.add("{\"name\": " + json_string(Method::name) +
               ", \"order\": " + std::to_string(Method::order) +
-              ", \"error_controlled\": " + (ErrorControlled<Method, S> ? "true" : "false") + '}'),
+              ", \"error_controlled\": " + (ErrorControlled<Method, S> ? "true" : "false") +
+              ", \"compensated\": " + sums<Method>() + '}'),
      ...);
     return list.text();
   }
@@ -373,6 +374,16 @@ struct MethodTable<std::tuple<Method...>, S> {
   }
 
  private:
+  /// Whether sums over steps are compensated; null where there are none.
+  template <class One>
+  [[nodiscard]] static std::string sums() {
+    if constexpr (requires { One::compensated; }) {
+      return One::compensated ? "true" : "false";
+    } else {
+      return "null";
+    }
+  }
+
   template <class One>
   [[nodiscard]] static bool choose_one(std::string_view name, AnyOf& method) {
     if constexpr (is_compiled<One>) {
@@ -385,8 +396,20 @@ struct MethodTable<std::tuple<Method...>, S> {
   }
 };
 
+/// The steppers, with sums as HAMOTOR_COMPENSATED asks for, a define before this header: `true` or
+/// `false`; without it as is each method's own way.
+#ifdef HAMOTOR_COMPENSATED
+inline constexpr Summation summation_asked =
+    HAMOTOR_COMPENSATED ? Summation::compensated : Summation::plain;
+template <class System>
+using CompiledSteppers = SteppersOf<System, summation_asked>;
+#else
+template <class System>
+using CompiledSteppers = SteppersOf<System>;
+#endif
+
 template <class Scene>
-using MethodsOf = MethodTable<SteppersOf<SystemOf<Scene>>, typename Scene::Scalar>;
+using MethodsOf = MethodTable<CompiledSteppers<SystemOf<Scene>>, typename Scene::Scalar>;
 
 template <class Scene>
 [[nodiscard]] std::string events_json() {
@@ -641,15 +664,21 @@ class Run {
   /// state now; the run is left as it is.  False where that step fails.
   [[nodiscard]] bool observe_at(double time, double* row) const noexcept {
     return std::visit(
-        [&](auto method) {
-          Run there = *this;
+        [&](auto& method) {
           const S part = S(time) - now();
-          StateOf<System> state = state_;
-          method.do_step(Scene::system, state, now(), part);
-          if (!is_finite(state)) return false;
-          there.stand_at({S(time), state, work_of(method)});
-          there.observe(row);
-          return true;
+          Moment there{S(time), state_, S(0)};
+          if constexpr (requires {
+                          method.look(Scene::system, state_, part, step_, part, there.work);
+                        }) {
+            if (scalar::abs(part) <= scalar::abs(step_)) {
+              there.state = method.look(Scene::system, state_, now(), step_, part, there.work);
+              return observe(there, row);
+            }
+          }
+          auto aside = method;
+          aside.do_step(Scene::system, there.state, now(), part);
+          there.work = work_of(aside);
+          return observe(there, row);
         },
         method_);
   }
@@ -658,10 +687,7 @@ class Run {
   [[nodiscard]] bool observe_event(std::int64_t k, double* row) const noexcept {
     const auto at = static_cast<std::size_t>(k);
     if (at >= happened_.size() || !happened_[at]) return false;
-    Run there = *this;
-    there.stand_at(moments_[at]);
-    there.observe(row);
-    return true;
+    return observe(moments_[at], row);
   }
 
   /// The state in the user's body frames.
@@ -682,6 +708,12 @@ class Run {
   }
 
  private:
+  [[nodiscard]] static bool observe(const Moment& moment, double* row) noexcept {
+    if (!is_finite(moment.state)) return false;
+    moment.write_row(Scene::system, row);
+    return true;
+  }
+
   template <class Method>
   [[nodiscard]] std::int64_t advance_with(Method& method, std::int64_t steps, std::int64_t every,
                                           double* rows) noexcept {
@@ -712,13 +744,6 @@ class Run {
       if (eventful) return done + 1;
     }
     return steps;
-  }
-
-  void stand_at(const Moment& moment) noexcept {
-    time_ = moment.time;
-    index_ = 0;
-    state_ = moment.state;
-    work_ = moment.work;
   }
 
   template <class Method>
@@ -777,7 +802,7 @@ class Run {
 
   [[nodiscard]] Moment moment() const noexcept { return {now(), state_, work_}; }
 
-  typename MethodsOf<Scene>::AnyOf method_;
+  mutable typename MethodsOf<Scene>::AnyOf method_;  ///< a look ahead keeps what it has found
   S time_;
   S step_;
   StateOf<System> state_{};

@@ -9,72 +9,16 @@
 #include <concepts>
 #include <cstddef>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 
+#include "hamotor/compensated.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/splitting_schemes.hpp"
 #include "hamotor/state.hpp"
 
 namespace hamotor {
 
-/// Whether a sum over steps carries the digits that each addition would lose.
-enum class Summation { plain, compensated };
-
 namespace detail {
-
-/// Adds `change` to `value`; `low` holds what does not fit (Neumaier 1974), so that a rounding
-/// error is made in the change only.
-template <class T>
-constexpr void add_compensated(T& value, T& low, const T& change) noexcept {
-  auto sum = value.components();
-  auto lost = low.components();
-  const auto add = change.components();
-  for (std::size_t k = 0; k < sum.size(); ++k) {
-    const auto pair = scalar::two_sum(sum[k], add[k] + lost[k]);
-    sum[k] = pair.hi;
-    lost[k] = pair.lo;
-  }
-  value = T::from(sum);
-  low = T::from(lost);
-}
-
-/// Largest absolute coefficient of M M~ − 1.
-template <class Defect>
-[[nodiscard]] constexpr typename Defect::Scalar size(const Defect& defect) noexcept {
-  return std::apply([](const auto&... x) { return scalar::max_abs(x...); }, defect.components());
-}
-
-/// M M~ − 1, rounded as its terms are: for steppers that round M itself in every step.  Products by
-/// table have no other.
-template <class Motor>
-[[nodiscard]] HAMOTOR_INLINE constexpr auto rounded_defect(const Motor& m) noexcept {
-  using S = typename Motor::Scalar;
-  using Defect = decltype(unit_defect_change(m, m));
-  if constexpr (requires { Defect::names; }) {
-    auto defect = unit_defect_change(m, m).components();
-    static_assert(Defect::names[0] == "s");
-    defect[0] = mul_add(S(0.5), defect[0], S(-1));
-    for (std::size_t k = 1; k < defect.size(); ++k) defect[k] = S(0.5) * defect[k];
-    return Defect::from(defect);
-  } else {
-    return unit_defect(m);
-  }
-}
-
-template <class S>
-constexpr void record(Drift<S>& drift, const S& defect) noexcept {
-  drift.largest = select(defect > drift.largest, defect, drift.largest);
-  drift.sum = drift.sum + defect;
-}
-
-/// The largest of all bodies' defects.
-template <class S, std::size_t N>
-constexpr void record(Drift<S>& drift, const std::array<S, N>& defects) noexcept {
-  S worst = defects[0];
-  for (std::size_t i = 1; i < N; ++i) worst = select(worst > defects[i], worst, defects[i]);
-  record(drift, worst);
-}
 
 /// The series of dexp⁻¹ for M = M₀ exp X, Ṁ = M B: Ẋ = B + ½ [X, B] + 1/12 [X, [X, B]] − …, whose
 /// next term is of fourth order in X.
@@ -158,20 +102,120 @@ template <class S, class Scheme>
   return weights;
 }
 
+/// What explicit methods share: how a step's end moves the state, and what is kept of it.
+template <HamiltonianSystem System, Summation summation>
+class ExplicitMethod {
+ protected:
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Motor = typename G::template Element<S>;
+  using Rate = typename G::template Rate<S>;
+  using Momentum = typename G::template Momentum<S>;
+  static constexpr std::size_t n = System::bodies;
+  using Motors = std::array<Motor, n>;
+  using Rates = std::array<Rate, n>;
+  using Momenta = std::array<Momentum, n>;
+
+ public:
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = summation == Summation::compensated;
+
+  /// How far the steps so far left the group.
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+
+  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
+  [[nodiscard]] constexpr const S& work() const noexcept
+    requires PoweredSystem<System>
+  {
+    return work_;
+  }
+
+  /// The next step is from another state: what sums lost of the last one is nothing to it.
+  constexpr void forget() noexcept { low_ = {}; }
+
+ protected:
+  /// Multiplies motors by exp X, for each X in turn, and adds `by` times what pushes the momenta
+  /// and works.
+  template <std::same_as<Rates>... X>
+  constexpr void turn(StateOf<System>& state, const S& by, const Momenta& forces, const S& power,
+                      const X&... x) noexcept {
+    if constexpr (compensated) {
+      ChangeOf<System> change{};
+      for (std::size_t i = 0; i < n; ++i) {
+        const auto gain = [&](const Rate& turned) {
+          change.motors[i] =
+              change.motors[i] + motor_change(state.motors[i] + change.motors[i], turned);
+        };
+        (gain(x[i]), ...);
+        change.momenta[i] = by * forces[i];
+      }
+      record(drift_, low_.add(state, change));
+    } else {
+      std::array<S, n> defects{};
+      for (std::size_t i = 0; i < n; ++i) {
+        auto& motor = state.motors[i];
+        ((motor = gp(motor, exp(x[i]))), ...);
+        const auto defect = unit_defect(motor);
+        defects[i] = size(defect);
+        motor = motor + unit_correction(motor, defect);
+        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
+      }
+      record(drift_, defects);
+    }
+    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+  }
+
+  /// The same where motors gain `by` times `motors`.
+  constexpr void shift(StateOf<System>& state, const S& by, const Motors& motors,
+                       const Momenta& forces, const S& power) noexcept {
+    if constexpr (compensated) {
+      ChangeOf<System> change{};
+      for (std::size_t i = 0; i < n; ++i) {
+        change.motors[i] = by * motors[i];
+        change.momenta[i] = by * forces[i];
+      }
+      record(drift_, low_.add(state, change));
+    } else {
+      std::array<S, n> defects{};
+      for (std::size_t i = 0; i < n; ++i) {
+        auto& motor = state.motors[i];
+        motor = mul_add(by, motors[i], motor);
+        const auto defect = rounded_defect(motor);
+        defects[i] = size(defect);
+        motor = motor + unit_correction(motor, defect);
+        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
+      }
+      record(drift_, defects);
+    }
+    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+  }
+
+  /// Six times the mean of a step of the classical method.
+  template <class T>
+  [[nodiscard]] static constexpr T mean(const T& one, const T& two, const T& three,
+                                        const T& four) noexcept {
+    return mul_add(S(2), two + three, one + four);
+  }
+
+ private:
+  [[no_unique_address]] LowDigits<System, summation> low_;
+  Drift<S> drift_;
+  S work_{};
+};
+
 }  // namespace detail
 
 /// Runge–Kutta–Munthe-Kaas method of order 4: the classical Runge–Kutta method for X in
 /// M = M₀ exp X and for μ (Munthe-Kaas 1998; Iserles, Munthe-Kaas, Nørsett & Zanna 2000).
 /// Four evaluations of rate and forque a step; not symplectic.
-template <HamiltonianSystem System>
-class Rkmk4 {
-  using S = typename System::Scalar;
-  using G = typename System::Group;
-  using Rate = typename G::template Rate<S>;
-  using Momentum = typename G::template Momentum<S>;
-  static constexpr std::size_t n = System::bodies;
-  using Rates = std::array<Rate, n>;
-  using Momenta = std::array<Momentum, n>;
+template <HamiltonianSystem System, Summation summation = Summation::plain>
+class Rkmk4 : public detail::ExplicitMethod<System, summation> {
+  using Base = detail::ExplicitMethod<System, summation>;
+  using Base::mean;
+  using Base::n;
+  using typename Base::Momenta;
+  using typename Base::Rates;
+  using typename Base::S;
 
  public:
   static constexpr int order = 4;
@@ -186,34 +230,13 @@ class Rkmk4 {
     const Slope three = slope_at(system, state, t, half_step, two);
     const Slope four = slope_at(system, state, t, h, three);
 
-    std::array<S, n> defects{};
+    Rates x{};
+    Momenta force{};
     for (std::size_t i = 0; i < n; ++i) {
-      const Rate x =
-          (h / S(6)) * mul_add(S(2), two.rate[i] + three.rate[i], one.rate[i] + four.rate[i]);
-      const Momentum force =
-          mul_add(S(2), two.force[i] + three.force[i], one.force[i] + four.force[i]);
-      auto& motor = state.motors[i];
-      motor = gp(motor, exp(x));
-      const auto defect = unit_defect(motor);
-      defects[i] = detail::size(defect);
-      motor = motor + unit_correction(motor, defect);
-      state.momenta[i] = mul_add(h / S(6), force, state.momenta[i]);
+      x[i] = (h / S(6)) * mean(one.rate[i], two.rate[i], three.rate[i], four.rate[i]);
+      force[i] = mean(one.force[i], two.force[i], three.force[i], four.force[i]);
     }
-    if constexpr (PoweredSystem<System>) {
-      work_ =
-          mul_add(h / S(6), mul_add(S(2), two.power + three.power, one.power + four.power), work_);
-    }
-    detail::record(drift_, defects);
-  }
-
-  /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
-
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
-  [[nodiscard]] constexpr const S& work() const noexcept
-    requires PoweredSystem<System>
-  {
-    return work_;
+    this->turn(state, h / S(6), force, mean(one.power, two.power, three.power, four.power), x);
   }
 
  private:
@@ -251,9 +274,6 @@ class Rkmk4 {
     }
     return slope(system, there, t + h, x);
   }
-
-  Drift<S> drift_;
-  S work_{};
 };
 
 /// The classical Runge–Kutta method of order 4 on the components of M and μ, put back on the group
@@ -261,13 +281,14 @@ class Rkmk4 {
 ///
 /// No exponentials: about half the time of `Rkmk4`, whose error is smaller where bodies turn fast.
 /// Four evaluations of rate and forque a step; not symplectic.
-template <HamiltonianSystem System>
-class Rk4 {
-  using S = typename System::Scalar;
-  using G = typename System::Group;
-  using Motor = typename G::template Element<S>;
-  using Momentum = typename G::template Momentum<S>;
-  static constexpr std::size_t n = System::bodies;
+template <HamiltonianSystem System, Summation summation = Summation::plain>
+class Rk4 : public detail::ExplicitMethod<System, summation> {
+  using Base = detail::ExplicitMethod<System, summation>;
+  using Base::mean;
+  using Base::n;
+  using typename Base::Momenta;
+  using typename Base::Motors;
+  using typename Base::S;
 
  public:
   static constexpr int order = 4;
@@ -282,48 +303,23 @@ class Rk4 {
     const Slope three = slope(system, moved(state, half_step, two), t + half_step);
     const Slope four = slope(system, moved(state, h, three), t + h);
 
-    std::array<S, n> defects{};
+    Motors motors{};
+    Momenta force{};
     for (std::size_t i = 0; i < n; ++i) {
-      auto& motor = state.motors[i];
-      motor = mul_add(h / S(6), mean(one.motors[i], two.motors[i], three.motors[i], four.motors[i]),
-                      motor);
-      const auto defect = detail::rounded_defect(motor);
-      defects[i] = detail::size(defect);
-      motor = motor + unit_correction(motor, defect);
-      state.momenta[i] =
-          mul_add(h / S(6), mean(one.force[i], two.force[i], three.force[i], four.force[i]),
-                  state.momenta[i]);
+      motors[i] = mean(one.motors[i], two.motors[i], three.motors[i], four.motors[i]);
+      force[i] = mean(one.force[i], two.force[i], three.force[i], four.force[i]);
     }
-    if constexpr (PoweredSystem<System>) {
-      work_ = mul_add(h / S(6), mean(one.power, two.power, three.power, four.power), work_);
-    }
-    detail::record(drift_, defects);
-  }
-
-  /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
-
-  /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
-  [[nodiscard]] constexpr const S& work() const noexcept
-    requires PoweredSystem<System>
-  {
-    return work_;
+    this->shift(state, h / S(6), motors, force,
+                mean(one.power, two.power, three.power, four.power));
   }
 
  private:
   /// Ṁ, μ̇ and dH/dt.
   struct Slope {
-    std::array<Motor, n> motors;
-    std::array<Momentum, n> force;
+    Motors motors;
+    Momenta force;
     S power{};
   };
-
-  /// Six times the mean of a step.
-  template <class T>
-  [[nodiscard]] static constexpr T mean(const T& one, const T& two, const T& three,
-                                        const T& four) noexcept {
-    return mul_add(S(2), two + three, one + four);
-  }
 
   [[nodiscard]] static constexpr Slope slope(const System& system, const StateOf<System>& state,
                                              const S& t) noexcept {
@@ -347,9 +343,6 @@ class Rk4 {
     }
     return there;
   }
-
-  Drift<S> drift_;
-  S work_{};
 };
 
 /// Symmetric, symplectic splitting of order 2, 4, 6, 8 or 10: kicks and free motions in turn, where
@@ -373,6 +366,8 @@ class Splitting {
  public:
   static constexpr int order = nominal_order;
   static constexpr std::string_view name = detail::splitting_name(nominal_order);
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = summation == Summation::compensated;
   /// Free motions in a step.
   static constexpr std::size_t stages = Scheme::stages;
   /// Whether steps can be left open: the turn that ends one and the turn that begins the next are
@@ -502,11 +497,6 @@ class Splitting {
     Motors at{};
     Momenta forque{};
   };
-  struct LowDigits {
-    Motors motors{};
-    Momenta momenta{};
-  };
-  static constexpr bool compensated = summation == Summation::compensated;
   static constexpr bool takes_whole_steps = detail::takes_split_steps<System>;
   static inline const auto weights = detail::rounded_weights<S, Scheme>();
   static constexpr bool opens_with_kick =
@@ -563,7 +553,7 @@ class Splitting {
   }
 
   [[no_unique_address]] std::conditional_t<System::has_forque, KnownForque, Nothing> known_;
-  [[no_unique_address]] std::conditional_t<compensated, LowDigits, Nothing> low_;
+  [[no_unique_address]] std::conditional_t<compensated, ChangeOf<System>, Nothing> low_{};
   Drift<S> drift_;
   unsigned open_steps_ = 0;
 };

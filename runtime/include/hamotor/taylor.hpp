@@ -60,11 +60,12 @@ namespace detail {
 /// (Jorba & Zou 2005). The order p = 7 − 0.72 ln ε is higher than their 1 − ½ ln ε, which is best
 /// where the time of a step goes as p²: here most of it goes as p. The polynomial of a step is
 /// dense output: what is asked for within its reach is evaluated, whatever the step asked for.
-/// Steps are increments with compensated sums. Without a tolerance, that of the scalar.
+/// Steps are increments, with compensated sums unless asked otherwise. Without a tolerance, that of
+/// the scalar.
 ///
 /// Coefficients are per power of a unit of time near the reach: per s, those of order 19 of a
 /// motion at 1000 rad/s exceed a float.
-template <AnalyticSystem System>
+template <AnalyticSystem System, Summation summation = Summation::compensated>
 class Taylor {
   using S = typename System::Scalar;
   using Recurrence = RecurrenceOf<System>;
@@ -80,6 +81,8 @@ class Taylor {
   /// The highest order: that for full precision.
   static constexpr int order = detail::series_order(scalar::Limits<S>::digits);
   static constexpr std::string_view name = "taylor";
+  /// Whether sums over steps are compensated.
+  static constexpr bool compensated = summation == Summation::compensated;
 
   /// Asks for this local error a unit of time, s⁻¹, relative to motors and momenta; for rounding
   /// only, in every step, where it is not positive or a step would have to be better than that.
@@ -174,7 +177,7 @@ class Taylor {
     for (std::size_t i = 0; i < n; ++i) {
       const auto sum = scalar::two_sum(x[i], change[i] + low_[i]);
       x[i] = sum.hi;
-      low_[i] = sum.lo;
+      if constexpr (compensated) low_[i] = sum.lo;
     }
     S worst(0);
     auto motors = Recurrence::leave(x).motors;
