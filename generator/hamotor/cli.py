@@ -199,7 +199,8 @@ def _parser() -> _Parser:
     bench.add_argument(
         "--with-peers",
         action="store_true",
-        help="install heyoka, SciPy, MuJoCo, Pinocchio and Bullet first, to measure beside",
+        help="install heyoka, SciPy, MuJoCo, Pinocchio and Bullet (for ensemble: JAX and MuJoCo) "
+        "first, to measure beside",
     )
     bench.add_argument(
         "--drift",
@@ -709,7 +710,7 @@ def _bench(parsed: argparse.Namespace) -> int:
     if parsed.scenes:
         raise UsageError(f"bench {parsed.what} takes no scenes; the other benchmarks do.")
     if parsed.what == "ensemble":
-        bench_ensemble(out, json=parsed.json, quick=parsed.quick)
+        bench_ensemble(out, json=parsed.json, quick=parsed.quick, with_peers=parsed.with_peers)
         return 0
     bench_kernels(out, json=parsed.json, quick=parsed.quick)
     return 0

@@ -175,16 +175,23 @@ class Report {
     }
   }
 
-  /// Whether Eigen's bodies move as ours, relative to |Π|.
+  /// The first body's angular momentum after a second.
   template <class Problem>
-  [[nodiscard]] static double disagreement(EigenResult (*run)(std::size_t, int, int)) {
+  [[nodiscard]] static std::array<double, 3> angular() {
     const auto system = Problem::template system<double>();
     using System = std::remove_cvref_t<decltype(system)>;
     auto state = member<System>(0);
     Rk4<System> method;
     for (int k = 0; k < 100; ++k) method.do_step(system, state, 0.0, step);
+    const auto found = state.momenta[0].components();
+    return {found[0], found[1], found[2]};
+  }
+
+  /// Whether Eigen's bodies move as ours, relative to |Π|.
+  template <class Problem>
+  [[nodiscard]] static double disagreement(EigenResult (*run)(std::size_t, int, int)) {
     const auto theirs = run(1, 100, 1).angular;
-    const auto ours = state.momenta[0].components();
+    const auto ours = angular<Problem>();
     double apart = 0;
     for (std::size_t k = 0; k < 3; ++k) apart = std::max(apart, std::abs(theirs[k] - ours[k]));
     return apart;
@@ -195,12 +202,24 @@ class Report {
   void print(double disagreement) const {
     std::printf(
         "{\"lanes\": %zu, \"isa\": \"%s\", \"cores\": %u, \"peak_flops\": %.6g, "
-        "\"disagreement\": %.3g,\n \"rows\": [\n%s]}\n",
+        "\"disagreement\": %.3g,\n %s,\n \"rows\": [\n%s]}\n",
         Lanes::lanes, std::string(hamotor::instruction_set).c_str(),
-        std::thread::hardware_concurrency(), peak_, disagreement, rows_.c_str());
+        std::thread::hardware_concurrency(), peak_, disagreement, reference().c_str(),
+        rows_.c_str());
   }
 
  private:
+  [[nodiscard]] static std::string reference() {
+    const auto free = angular<FreeRotation>();
+    const auto spring = angular<Spring>();
+    std::array<char, 512> text{};
+    std::snprintf(text.data(), text.size(),
+                  "\"angular\": {\"%s\": [%.17g, %.17g, %.17g], \"%s\": [%.17g, %.17g, %.17g]}",
+                  FreeRotation::name, free[0], free[1], free[2], Spring::name, spring[0], spring[1],
+                  spring[2]);
+    return text.data();
+  }
+
   [[nodiscard]] static int steps_for(std::size_t bodies) {
     return bodies > 100000 ? 32 : bodies > 4096 ? 64 : static_cast<int>(131072 / bodies);
   }

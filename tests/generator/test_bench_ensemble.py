@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -36,12 +37,39 @@ def test_ratios_are_of_the_better_compilers() -> None:
         "clang++",
     )
     machine = {"lanes": 8, "isa": "avx512", "cores": 2, "peak_flops": 1e11}
-    text = ensemble.table({"rows": [*one, *other], "machine": machine})
+    theirs = row("JAX", 16384, 1, 20) | {"angular": [1, 2, 3]}
+    account = {
+        "rows": [*one, *other, theirs],
+        "machine": machine,
+        "tuned": {"JAX": "tuned"},
+        "gaps": {"mujoco": "not installed: command"},
+    }
+    text = ensemble.table(account)
     (line,) = [x for x in text.splitlines() if x.split()[2:3] == ["1024"]]
     assert line.split()[4:] == ["100.0", "500", "50%", "5.0", "20.0"]
+    assert "JAX, spring, rk4: 20 million with 16384 bodies; ours is 5.0 times as fast" in text
+    assert "mujoco: not installed: command" in text
     assert "1048576 bodies at 80% of the rate of 1024; 2 cores at 95% each" in text
 
 
 def test_bodies_that_move_otherwise_are_not_compared() -> None:
     with pytest.raises(CheckFailed, match="cannot be compared"):
         ensemble.account_rows(said(row("packs", 64, 1, 1), disagreement=1e-3), "g++")
+
+
+def test_peers_that_move_otherwise_are_not_compared(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = row("JAX", 1024, 1, 10) | {"angular": [1.0, 2.0, 3.1]}
+    monkeypatch.setattr(ensemble, "_peers", lambda *_: {"rows": [found]})
+    kept = ensemble.peer_rows({"jax": "1"}, {"spring": [1, 2, 3.101]}, {}, quick=True)
+    assert [x["contestant"] for x in kept] == ["JAX", "JAX"]
+    with pytest.raises(CheckFailed, match=r"JAX's bodies .* cannot be compared"):
+        ensemble.peer_rows({"jax": "1"}, {"spring": [1, 2, 4]}, {}, quick=True)
+
+
+def test_a_peer_that_is_not_there_says_what_installs_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(ensemble, "PEERS_PYTHON", tmp_path / "python")
+    gaps: dict[str, str] = {}
+    assert ensemble.peers_here(gaps) == {}
+    assert gaps == dict.fromkeys(("jax", "mujoco"), f"not installed: {ensemble.INSTALL}")

@@ -20,7 +20,7 @@ from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, toy, toy_sta
 
 import hamotor
 from hamotor.errors import ToolError, UsageError
-from hamotor.run import cluster
+from hamotor.run import build, cluster
 from hamotor.run.account import account
 from hamotor.run.ensemble import CHUNK, PART, Job, Part
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
@@ -533,3 +533,23 @@ def test_states_of_another_shape_are_refused() -> None:
     library: SceneLibrary = toy().compile().library
     with pytest.raises(ToolError, match="states of shape"):
         library.start_ensemble("splitting2", step=0.1, states=np.zeros((1, 3)))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("method", ["rk4", "taylor"])
+def test_no_bit_depends_on_the_instruction_set(
+    monkeypatch: pytest.MonkeyPatch, method: str
+) -> None:
+    found = {}
+    for name in build.INSTRUCTION_SETS:
+        monkeypatch.setenv("HAMOTOR_ISA", name)
+        try:
+            build.flags_for(os.uname().machine)
+        except UsageError:  # not on this machine
+            continue
+        run = run_ensemble("tumbling_debris", 16, end=1.0, method=method)
+        assert run.report["ensemble"]["isa"] == name
+        found[name] = digest(run)
+    monkeypatch.delenv("HAMOTOR_ISA")
+    run = run_ensemble("tumbling_debris", 16, end=1.0, method=method)
+    assert {*found.values()} <= {digest(run)}

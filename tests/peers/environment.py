@@ -1,8 +1,8 @@
 """Where the peers are installed: an environment of their own, apart from what Hamotor needs.
 
 `python -m tests.peers.environment` installs them; `./hamotor test --with-peers` does so first.
-Public solvers to measure beside have another one, `python -m tests.peers.environment solvers`, and
-so has dask, `python -m tests.peers.environment dask`, which sees the packages of ours as well.
+Public solvers to measure beside have another one, `python -m tests.peers.environment solvers`, as
+have those for ensembles (`ensembles`) and dask (`dask`), which sees the packages of ours as well.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ PYTHON = FOLDER / "python" / "bin" / "python"
 NODE_MODULES = FOLDER / "node" / "node_modules"
 _PYTHON_PINS = (HERE / "requirements.txt",)
 _SOLVER_PINS = (ROOT / "tests" / "bench" / "precision" / "requirements.txt",)
+_ENSEMBLE_PINS = (ROOT / "tests" / "bench" / "ensemble_requirements.txt",)
 _DASK_PINS = (ROOT / "requirements-dask.lock",)
 DASK_PYTHON = FOLDER / "dask" / "bin" / "python"
 INSTALL_DASK = ".hamotor/venv/bin/python -m tests.peers.environment dask"
@@ -54,11 +55,19 @@ def install() -> list[str]:
 
 def install_solvers() -> list[str]:
     """The same for the public solvers that `./hamotor bench precision` measures beside."""
+    return _install_part("solvers", _SOLVER_PINS)
+
+
+def install_ensembles() -> list[str]:
+    """The same for what `./hamotor bench ensemble` measures beside."""
+    return _install_part("ensembles", _ENSEMBLE_PINS)
+
+
+def _install_part(part: str, pins: tuple[Path, ...]) -> list[str]:
     FOLDER.mkdir(parents=True, exist_ok=True)
     with (FOLDER / "lock").open("w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        done = _stamp("solvers") == _digest(_SOLVER_PINS)
-        return [] if done else _install_python("solvers", _SOLVER_PINS)
+        return [] if _stamp(part) == _digest(pins) else _install_python(part, pins)
 
 
 def has_dask() -> bool:
@@ -133,7 +142,7 @@ def _stamp(part: str) -> str:
 
 
 if __name__ == "__main__":
-    others = {"solvers": install_solvers, "dask": install_dask}
+    others = {"solvers": install_solvers, "ensembles": install_ensembles, "dask": install_dask}
     asked = others.get(" ".join(sys.argv[1:]), install)
     if problems := asked():
         sys.exit("\n".join(problems))

@@ -2,37 +2,61 @@
 
 One C++ program of tests/bench per compiler measures everything in one process, the processor's
 peak included: multiply-adds that wait for nothing, in registers of the same width.  A time is the
-shortest of many runs, because whatever else the machine does only adds to it.
+shortest of many runs, because whatever else the machine does only adds to it.  JAX and MuJoCo,
+where they are installed, step the same bodies on one core in processes of their own.
 """
 
 from __future__ import annotations
 
 import json as json_text
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 from hamotor.bench.account import publish, say
 from hamotor.bench.kernels import build_program, compilers_here, program_provenance, run_tool
-from hamotor.errors import CheckFailed
+from hamotor.bench.problems import ROOT
+from hamotor.bench.solvers import install_peers
+from hamotor.errors import CheckFailed, ToolError
 
 IN_CACHE: Final = 1024
 """Bodies whose ratio to Eigen and share of the peak the table shows."""
 AGREEMENT: Final = 1e-6
 """Of the angular momenta after a second by two ways of Runge and Kutta's method."""
 
+PEERS: Final[Mapping[str, Sequence[Sequence[str]]]] = {
+    "jax": (("jax", "256"), ("jax", "512")),
+    "mujoco": (("mujoco",),),
+}
+"""The package of each, and with what words tests/bench/ensemble_peers.py is started."""
+PEERS_PYTHON: Final = ROOT / ".hamotor" / "peers" / "ensembles" / "bin" / "python"
+INSTALL: Final = "./hamotor bench ensemble --with-peers"
+PEERS_AGREEMENT: Final = 1e-2
+"""The same of other methods: MuJoCo's is of order 2 in the attitude, as is a splitting."""
+TUNED: Final[Mapping[str, str]] = {
+    "JAX": "the same formulas in float64, an array for each number of all bodies, all steps in one "
+    "jit, one thread, the better of registers of 256 and 512 bits",
+    "MuJoCo": "RK4 by rollout, one thread, a ball or free joint, a tendon for the spring, contacts "
+    "and constraints off",
+}
+"""How it is done that nobody is slower than it need be."""
+
 Rows = Sequence[Mapping[str, Any]]
 
 
 def bench_ensemble(
-    out: Path | None = None, json: bool = False, quick: bool = False
+    out: Path | None = None, json: bool = False, quick: bool = False, with_peers: bool = False
 ) -> dict[str, Any]:
     """Build and run the benchmark of ensembles, some three minutes, and account for it.
 
     out: where ensemble.json goes; None: nowhere.  json: print the account instead of the table.
-    quick: fewer repetitions, no more than 16,384 bodies.  Returns the account.  Raises ToolError
-    if a tool is missing or the build fails, CheckFailed if Eigen's bodies move otherwise.
+    quick: fewer repetitions, no more than 16,384 bodies.  with_peers: first install JAX and MuJoCo
+    from PyPI, in an environment of their own.  Returns the account.  Raises ToolError
+    if a tool is missing or the build fails, CheckFailed if others' bodies move otherwise.
     """
+    if with_peers:
+        install_peers("ensembles")
     compilers = compilers_here()
     say(f"building with {' and '.join(compilers)}")
     programs = {c: build_program(c, "ensemble", quick=True) for c in compilers}
@@ -44,13 +68,19 @@ def bench_ensemble(
         rows += account_rows(said, compiler)
         peak = max(said["peak_flops"], machine.get("peak_flops", 0.0))
         machine = {**{k: said[k] for k in ("lanes", "isa", "cores")}, "peak_flops": peak}
+        angular = said["angular"]
+    gaps: dict[str, str] = {}
+    versions = peers_here(gaps)
+    rows += peer_rows(versions, angular, gaps, quick=quick)
     account = {
         "benchmark": "ensemble",
         "quick": quick,
         "unit": "bodies' steps per second, of all threads together",
         "machine": machine,
         "rows": rows,
-        "provenance": program_provenance(programs),
+        "gaps": gaps,
+        "tuned": TUNED,
+        "provenance": {**program_provenance(programs), "peers": versions},
     }
     publish(account, table, out=out, as_json=json)
     return account
@@ -73,6 +103,47 @@ def account_rows(said: Mapping[str, Any], compiler: str) -> list[dict[str, Any]]
         }
         for row in said["rows"]
     ]
+
+
+def _peers(*words: str) -> Any:
+    """What tests/bench/ensemble_peers.py says.  ToolError if it fails."""
+    return json_text.loads(run_tool(str(PEERS_PYTHON), "-m", "tests.bench.ensemble_peers", *words))
+
+
+def peers_here(gaps: dict[str, str]) -> dict[str, str]:
+    """Versions of the peers there are; what is missing goes to `gaps`."""
+    said = _peers("versions") if PEERS_PYTHON.is_file() else {}
+    versions = {name: said[name] for name in PEERS if said.get(name) is not None}
+    gaps |= {name: f"not installed: {INSTALL}" for name in PEERS if name not in versions}
+    return versions
+
+
+def peer_rows(
+    versions: Mapping[str, str],
+    angular: Mapping[str, Sequence[float]],
+    gaps: dict[str, str],
+    *,
+    quick: bool,
+) -> list[dict[str, Any]]:
+    """What the peers there are measured; `angular`: where the first body's momentum must be."""
+    rows: list[dict[str, Any]] = []
+    for name in versions:
+        for words in PEERS[name]:
+            say(f"timing, {' '.join(words)}")
+            try:
+                said = _peers(*words, *(["--quick"] if quick else []))
+            except ToolError as problem:
+                gaps[name] = str(problem)
+                continue
+            rows += [{**row, "compiler": " ".join(words)} for row in said["rows"]]
+    for row in rows:
+        apart = math.dist(row["angular"], angular[row["problem"]])
+        if not apart <= PEERS_AGREEMENT * math.hypot(*angular[row["problem"]]):
+            raise CheckFailed(
+                f"hamotor bench: {row['contestant']}'s bodies ({row['problem']}, {row['method']}) "
+                f"differ from ours by {apart:.2g}; they cannot be compared"
+            )
+    return rows
 
 
 def best(rows: Rows, **wanted: Any) -> Mapping[str, Any] | None:
@@ -114,12 +185,36 @@ def table(account: Mapping[str, Any]) -> str:
             text += f"{rate / 1e6:>8.1f}{row['steps_per_second'] / rate:>7.1f}"
         lines.append(text)
     lines += [
+        *beside(account),
         *scaling(rows),
         "  FLOP: operations of a step, counted, a multiply-add as two, of which a peak is made up;",
         "  Eigen: the same by quaternion and vectors, an array of structures, the best compiler.",
         "  Shortest times on a machine as busy as yours is now: read the ratios.",
     ]
     return "\n".join(lines)
+
+
+def beside(account: Mapping[str, Any]) -> list[str]:
+    """Others than Eigen, each with as many bodies as it is fastest with; and what is missing."""
+    rows = account["rows"]
+    lines = []
+    for who, problem, method in dict.fromkeys(
+        (row["contestant"], row["problem"], row["method"])
+        for row in rows
+        if row["contestant"] not in {"packs", "Eigen"}
+    ):
+        case = {"problem": problem, "method": method}
+        theirs = best(rows, **case, contestant=who)
+        ours = best(rows, **case, contestant="packs", bodies=IN_CACHE, threads=1)
+        assert theirs is not None
+        assert ours is not None
+        rate = theirs["steps_per_second"]
+        lines.append(
+            f"  {who}, {problem}, {method}: {rate / 1e6:.3g} million with {theirs['bodies']} "
+            f"bodies; ours is {ours['steps_per_second'] / rate:.1f} times as fast"
+        )
+    lines += [f"  {who}: {how}" for who, how in account["tuned"].items() if lines]
+    return [*lines, *(f"  {who}: {why}" for who, why in account["gaps"].items())]
 
 
 def scaling(rows: Rows) -> list[str]:

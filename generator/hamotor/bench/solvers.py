@@ -62,11 +62,11 @@ SILENT_S: Final = 60.0
 """How long the stopwatch may be at one setting: some hundred times what any takes."""
 
 
-def install_peers() -> None:
-    """Install the public solvers from PyPI into an environment of their own."""
+def install_peers(part: str = "solvers") -> None:
+    """Install the public solvers of a benchmark from PyPI into an environment of their own."""
     say("installing the public solvers of PyPI")
     done = subprocess.run(
-        (sys.executable, "-m", "tests.peers.environment", "solvers"), cwd=ROOT, check=False
+        (sys.executable, "-m", "tests.peers.environment", part), cwd=ROOT, check=False
     )
     if done.returncode:
         say("hamotor bench: not all peers could be installed; the others are measured")
