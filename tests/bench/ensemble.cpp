@@ -64,11 +64,12 @@ struct Spring {
     const auto at = in<S>(spring_at);
     return hamotor::RigidBodies{
         std::tuple{hamotor::FreeBody<SE3, S, split>(S(mass), in<S>(moments))},
-        std::tuple{hamotor::SpringToWorld<0, SE3, S, hamotor::RestLength::zero>{
-            .at = {at[0], at[1], at[2]},
-            .anchor = {S(0), S(0), S(0)},
-            .stiffness = S(stiffness),
-            .rest_length = S(0)}}};
+        std::tuple{
+            hamotor::SpringToWorld<0, SE3, S, hamotor::RestLength::zero, hamotor::pga3::Origin<S>>{
+                .at = {at[0], at[1], at[2]},
+                .anchor = {},
+                .stiffness = S(stiffness),
+                .rest_length = S(0)}}};
   }
 };
 

@@ -154,6 +154,34 @@ TEST(RotationSplit, knows_a_nearly_symmetric_body) {
   EXPECT_FALSE(hamotor::rotation_split(std::array<double, 3>{1, 2, 3}).nearly_symmetric);
 }
 
+template <class G, class Body>
+void expect_the_origin_to_be_a_point(const Body& body) {
+  using hamotor::RestLength;
+  using hamotor::SpringToWorld;
+  using Space = hamotor::Space<G>;
+  using Point = typename Space::template Point<double>;
+  using Origin = typename Space::template Origin<double>;
+  std::array<double, Space::dimension> at{};
+  at[0] = 0.3;
+  at[1] = -0.2;
+  const hamotor::RigidBodies general{
+      std::tuple{body},
+      std::tuple{SpringToWorld<0, G, double>{Point::from(at), Point::from({}), 5, 0.4}}};
+  const hamotor::RigidBodies lean{
+      std::tuple{body}, std::tuple{SpringToWorld<0, G, double, RestLength::positive, Origin>{
+                            Point::from(at), Origin{}, 5, 0.4}}};
+  const auto state = sample::generic_state(general);
+  EXPECT_NEAR(lean.energy(state), general.energy(state), 1e-14 * general.energy(state));
+  const auto expected = general.forque(state.motors)[0].components();
+  const auto found = lean.forque(state.motors)[0].components();
+  for (std::size_t k = 0; k < found.size(); ++k) EXPECT_NEAR(found[k], expected[k], 1e-14);
+}
+
+TEST(Spring, to_the_origin_is_one_to_a_point) {
+  expect_the_origin_to_be_a_point<hamotor::pga3::SE3>(sample::body());
+  expect_the_origin_to_be_a_point<hamotor::pga2::SE2>(sample::plate());
+}
+
 TEST(AngleIncrement, has_all_digits_of_any_angle) {
   using hamotor::AngleIncrement;
   using Wide = long double;

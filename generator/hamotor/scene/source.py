@@ -222,8 +222,12 @@ def _interactions(scene: Scene, scalar: Scalar) -> list[dict[str, Any]]:
         common = f"Group, Scalar, hamotor::RestLength::{slack}"
         near = attached(spring.body, spring.at)
         if spring.other is None:
+            at_origin = scene.group.translates and not any(spring.anchor or ())
+            anchor = "" if at_origin else _literals(spring.anchor or (), scalar)
+            if at_origin:
+                common += ", typename hamotor::Space<Group>::template Origin<Scalar>"
             kind = f"SpringToWorld<{number[spring.body]}, {common}>"
-            ends = [f".at = {near}", f".anchor = {{{_literals(spring.anchor or (), scalar)}}}"]
+            ends = [f".at = {near}", f".anchor = {{{anchor}}}"]
         else:
             kind = f"SpringBetween<{number[spring.body]}, {number[spring.other]}, {common}>"
             far = attached(spring.other, spring.other_at or ())

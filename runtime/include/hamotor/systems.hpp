@@ -37,6 +37,7 @@ class FreeBody {
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
   using Point = typename Space<G>::template Point<S>;
+  using Origin = typename Space<G>::template Origin<S>;
   using Direction = typename Space<G>::template Direction<S>;
   static constexpr std::size_t rotations = Space<G>::rotations;
   static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
@@ -144,8 +145,11 @@ class FreeBody {
     return sandwich(m, x);
   }
 
-  /// A point of the world in the principal frame, m.
+  /// A point of the world in the principal frame, m; for its origin two thirds of the operations.
   [[nodiscard]] constexpr Point in_body(const Element& m, const Point& x) const noexcept {
+    return sandwich(reverse(m), x);
+  }
+  [[nodiscard]] constexpr Point in_body(const Element& m, const Origin& x) const noexcept {
     return sandwich(reverse(m), x);
   }
 
@@ -406,23 +410,28 @@ template <RestLength rest, class S>
   }
 }
 
-template <class Point>
-[[nodiscard]] constexpr auto difference(const Point& x, const Point& y) noexcept {
+/// x − y of points, also of the origin y, which has no components.
+template <class Point, class Other>
+[[nodiscard]] constexpr auto difference(const Point& x, [[maybe_unused]] const Other& y) noexcept {
   auto d = x.components();
-  const auto b = y.components();
-  for (std::size_t k = 0; k < d.size(); ++k) d[k] = d[k] - b[k];
+  if constexpr (Other::size > 0) {
+    const auto b = y.components();
+    for (std::size_t k = 0; k < d.size(); ++k) d[k] = d[k] - b[k];
+  }
   return d;
 }
 
 }  // namespace detail
 
-/// Spring from a point of body number `index` to a point of the world.
-template <std::size_t index, class G, class S, RestLength rest = RestLength::positive>
+/// Spring from a point of body number `index` to a point of the world: any Point or, for a body
+/// that moves freely, the Origin.
+template <std::size_t index, class G, class S, RestLength rest = RestLength::positive,
+          class Anchor = typename Space<G>::template Point<S>>
 struct SpringToWorld {
-  typename Space<G>::template Point<S> at;      ///< in the body's principal frame, m
-  typename Space<G>::template Point<S> anchor;  ///< in the world, m
-  S stiffness;                                  ///< N/m
-  S rest_length;                                ///< m; not read where `rest` is zero
+  typename Space<G>::template Point<S> at;  ///< in the body's principal frame, m
+  Anchor anchor;                            ///< in the world, m
+  S stiffness;                              ///< N/m
+  S rest_length;                            ///< m; not read where `rest` is zero
 
   template <class System, class Motors>
   [[nodiscard]] constexpr S potential(const System& system, const Motors& motors) const noexcept {
@@ -431,14 +440,15 @@ struct SpringToWorld {
     return detail::spring_energy<rest>(stiffness, rest_length, detail::dot(d, d));
   }
 
-  /// Adds the body forque: the spring's line, joined in the body frame, times −k (1 − ℓ/r).
+  /// Adds the body forque: the line of k (1 − ℓ/r) times the extension, in the body frame.
   template <class System, class Motors, class Momenta>
   constexpr void add_forque(const System& system, const Motors& motors,
                             Momenta& forque) const noexcept {
-    const auto end = system.template body<index>().in_body(motors[index], anchor);
-    const auto d = detail::difference(at, end);
-    const S pull = detail::tension<rest>(stiffness, rest_length, d);
-    forque[index] = mul_add(-pull, Space<G>::wrench(regressive(at, end)), forque[index]);
+    auto f = detail::difference(at, system.template body<index>().in_body(motors[index], anchor));
+    const S pull = detail::tension<rest>(stiffness, rest_length, f);
+    for (auto& x : f) x = pull * x;
+    const auto force = Space<G>::template Direction<S>::from(f);
+    forque[index] = forque[index] + Space<G>::wrench(regressive(at, force));
   }
 };
 
