@@ -267,6 +267,8 @@ def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
     assert "const auto four_b_e01 = lanes::load<S, 12>(b);" in lines
     both = "turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2)"
     assert f"lanes::store<0>(result, {both});" in lines
+    difference = "turned<1, 2, -3, 4>(sum2) - turned<1, 2, -3, 4>(sum1)"
+    assert f"lanes::store<8>(result, {difference});" in lines
     assert not any(line.startswith("const S ") for line in lines)
     assert any("four(a.e01), turned<-1, -4, -3, -2>(four_b_e1i)" in line for line in lines)
     assert packed["cga3 gp Vector Vector"] is None

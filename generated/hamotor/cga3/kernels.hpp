@@ -29,10 +29,10 @@ template <class S>
       const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_b_s = lanes::load<S, 0>(b);
       const auto four_b_e0i = lanes::load<S, 8>(b);
-      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_s = lanes::load<S, 0>(a);
       const auto four_a_e0i = lanes::load<S, 8>(a);
-      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) + turned<-1, -2, 3, -4>(four_a_e0i);
+      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
       const auto four_b_e01 = lanes::load<S, 12>(b);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
@@ -70,7 +70,7 @@ template <class S>
       Versor<S> result;
       lanes::store<0>(result, turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
-      lanes::store<8>(result, turned<-1, -2, 3, -4>(sum1) + turned<1, 2, -3, 4>(sum2));
+      lanes::store<8>(result, turned<1, 2, -3, 4>(sum2) - turned<1, 2, -3, 4>(sum1));
       lanes::store<12>(result, turned<1, 4, 3, 2>(sum4));
       return result;
     }
@@ -153,10 +153,10 @@ template <class S>
       using lanes::turned;
       const auto four_b_s = lanes::load<S, 0>(b);
       const auto four_b_e0i = lanes::load<S, 8>(b);
-      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_s = lanes::load<S, 0>(a);
       const auto four_a_e0i = lanes::load<S, 8>(a);
-      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) + turned<-1, -2, 3, -4>(four_a_e0i);
+      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
       const auto four_b_e1i = lanes::load<S, 4>(b);
@@ -304,10 +304,10 @@ template <class S>
       const auto four_b_e1i = lanes::load<S, 4>(b);
       const auto four_b_s = lanes::load<S, 0>(b);
       const auto four_b_e0i = lanes::load<S, 8>(b);
-      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) + turned<-1, -2, 3, -4>(four_b_e0i);
+      const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_s = lanes::load<S, 0>(a);
       const auto four_a_e0i = lanes::load<S, 8>(a);
-      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) + turned<-1, -2, 3, -4>(four_a_e0i);
+      const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
       const auto four_b_e01 = lanes::load<S, 12>(b);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
@@ -345,7 +345,7 @@ template <class S>
       Even<S> result;
       lanes::store<0>(result, turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2));
       lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
-      lanes::store<8>(result, turned<-1, -2, 3, -4>(sum1) + turned<1, 2, -3, 4>(sum2));
+      lanes::store<8>(result, turned<1, 2, -3, 4>(sum2) - turned<1, 2, -3, 4>(sum1));
       lanes::store<12>(result, turned<1, 4, 3, 2>(sum4));
       return result;
     }

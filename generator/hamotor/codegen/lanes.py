@@ -99,7 +99,8 @@ def _block(
     if len(outputs) < WIDTH:
         return None
     if all(name in place for name, _ in outputs):
-        return _in_order(place, [Name(name) for name, _ in outputs])
+        whole = _in_order(place, [Name(name) for name, _ in outputs])
+        return _turned(*whole) if whole else None
     factors, left, right = [], [], []
     for _, expression in outputs:
         match expression:
@@ -111,17 +112,35 @@ def _block(
                 return None
         left.append(x)
         right.append(y)
-    operator = "+"
-    if all(isinstance(y, Negative) for y in right):
-        operator, right = "-", [_unsigned(y)[1] for y in right]
     sides = _in_order(place, left), _in_order(place, right)
     if len(factors) not in (0, WIDTH) or sides[0] is None or sides[1] is None:
         return None
-    both = f" {operator} ".join(filter(None, sides))
+    both = _added(sides[0], sides[1])
     return f"four({', '.join(factors)}) * ({both})" if factors else both
 
 
-def _in_order(place: Mapping[str, tuple[str, int]], lanes: Sequence[Expression]) -> str | None:
+_Turned = tuple[str, tuple[int, ...]]
+"""A vector, and its lanes in the order and with the signs of `turned`."""
+
+
+def _turned(vector: str, order: Sequence[int]) -> str:
+    if list(order) == list(range(1, WIDTH + 1)):
+        return vector
+    return f"turned<{', '.join(map(str, order))}>({vector})"
+
+
+def _added(a: _Turned, b: _Turned) -> str:
+    """a + b, by the same bits a difference where one's first lane is negated: a vector that is
+    wanted with both signs is then turned once."""
+    negative_a, negative_b = a[1][0] < 0, b[1][0] < 0
+    if negative_a and not negative_b:
+        a, b, negative_a, negative_b = b, a, negative_b, negative_a
+    if negative_b and not negative_a:
+        return f"{_turned(*a)} - {_turned(b[0], [-lane for lane in b[1]])}"
+    return f"{_turned(*a)} + {_turned(*b)}"
+
+
+def _in_order(place: Mapping[str, tuple[str, int]], lanes: Sequence[Expression]) -> _Turned | None:
     """Lanes of one sum, in another order and with signs."""
     order = []
     vectors = set()
@@ -134,10 +153,7 @@ def _in_order(place: Mapping[str, tuple[str, int]], lanes: Sequence[Expression])
         order.append(sign * (number + 1))
     if len(vectors) != 1:
         return None
-    (vector,) = vectors
-    if order == list(range(1, WIDTH + 1)):
-        return vector
-    return f"turned<{', '.join(map(str, order))}>({vector})"
+    return vectors.pop(), tuple(order)
 
 
 def _unsigned(expression: Expression) -> tuple[int, Expression]:
@@ -241,17 +257,18 @@ class _Packer:
             if set(signs) != {1}:
                 raise _Unpackable
             return self.text(lanes)
+        return _turned(*self._lanes(signs, lanes))
+
+    def _lanes(self, signs: list[int], lanes: list[Expression]) -> _Turned:
         names = [x.text for x in lanes if isinstance(x, Name)]
         if len(set(names)) != WIDTH:
             raise _Unpackable
         register = self._register(names)
         where = [register.index(name) for name in names]
-        if where == list(range(WIDTH)) and set(signs) == {1}:
-            return self._name(register)
         if where != list(range(WIDTH)):
             self._shuffles.add((self._name(register), tuple(where)))
-        order = ", ".join(str(s * (k + 1)) for s, k in zip(signs, where, strict=True))
-        return f"turned<{order}>({self._name(register)})"
+        order = tuple(s * (k + 1) for s, k in zip(signs, where, strict=True))
+        return self._name(register), order
 
     def _register(self, names: list[str]) -> list[str]:
         key = frozenset(names)
@@ -280,12 +297,12 @@ class _Packer:
                 return ""
             for part, x in zip(parts, (expression.a, expression.b), strict=True):
                 part.append(_unsigned(x))
-        texts = []
+        sides = []
         for part in parts:
             if not all(isinstance(x, Name) and x.text in self._place for _, x in part):
                 return ""
-            texts.append(self._second([s for s, _ in part], [x for _, x in part]))
-        return " + ".join(texts)
+            sides.append(self._lanes([s for s, _ in part], [x for _, x in part]))
+        return _added(*sides)
 
     def _loaded(self, names: Sequence[str]) -> str:
         """Four components that stand side by side, or four numbers."""
