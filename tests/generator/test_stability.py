@@ -77,6 +77,15 @@ def test_a_promise_that_is_not_kept_fails(
     assert any("from the start" in failure for failure in row.failures)
 
 
+def test_what_returns_in_a_wider_scalar_only_passes(
+    needle: stability.Case, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stability, "reversal", lambda *_: 1e-3)
+    row = stability.judged("needle", needle, reference, "splitting2")
+    assert row.verdict == "pass", row.failures
+    assert any("by roundings of its own" in note for note in row.notes)
+
+
 def test_a_step_that_is_too_long_is_divided(
     needle: stability.Case, reference: stability.Reference
 ) -> None:
