@@ -109,6 +109,7 @@ function(hamotor_dispatcher file)
     string(APPEND sets "      {\"${isa}\", true${condition}},\n")
   endforeach()
   set(functions "")
+  set(choices "")
   foreach(function IN LISTS ARGN)
     string(APPEND functions "HAMOTOR_FUNCTION(${function})\n")
     string(APPEND choices "  hamotor_${function}_chosen = hamotor_${function}_all[chosen];\n")
@@ -120,16 +121,15 @@ function(hamotor_dispatcher file)
 #include <cstring>
 
 // Until a set is chosen, before any other initialisation, it is the one that all processors have.
-#define HAMOTOR_FUNCTION(name)                                                       \
-  extern "C" void name##_sse2();                                                     \
-  extern "C" void name##_avx2();                                                     \
-  extern "C" void name##_avx512();                                                   \
-  extern "C" {                                                                       \
-  [[gnu::visibility("hidden")]] extern void (*hamotor_##name##_chosen)();            \
-  void (*hamotor_##name##_chosen)() = name##_sse2;                                   \
-  }                                                                                  \
+#define HAMOTOR_HIDDEN extern "C" [[gnu::visibility("hidden")]]
+#define HAMOTOR_FUNCTION(name)                                                               \
+  HAMOTOR_HIDDEN void name##_sse2();                                                         \
+  HAMOTOR_HIDDEN void name##_avx2();                                                         \
+  HAMOTOR_HIDDEN void name##_avx512();                                                       \
+  HAMOTOR_HIDDEN void (*hamotor_##name##_chosen)();                                          \
+  void (*hamotor_##name##_chosen)() = name##_sse2;                                           \
   static void (*const hamotor_##name##_all[])() = {name##_sse2, name##_avx2, name##_avx512}; \
-  asm(".text\n.p2align 4\n.globl " #name "\n.type " #name ", @function\n" #name      \
+  asm(".text\n.p2align 4\n.globl " #name "\n.type " #name ", @function\n" #name              \
       ":\n  endbr64\n  jmp *hamotor_" #name "_chosen(%rip)\n.size " #name ", .-" #name "\n");
 @functions@
 namespace {

@@ -40,7 +40,8 @@ def digest(run: EnsembleRun) -> str:
         found.update(name.encode() + np.ascontiguousarray(values).tobytes())
     found.update(np.ascontiguousarray(run.states).tobytes())
     said = {k: v for k, v in run.report.items() if k not in {"timing", "provenance"}}
-    said["ensemble"] = {k: v for k, v in said["ensemble"].items() if k not in {"engine", "threads"}}
+    who = {"engine", "threads", "lanes", "isa"}
+    said["ensemble"] = {k: v for k, v in said["ensemble"].items() if k not in who}
     found.update(json.dumps(said, sort_keys=True).encode())
     for member in run.report["ensemble"]["kept"]:
         for values in run.trajectory(member).values():

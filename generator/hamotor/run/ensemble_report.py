@@ -53,7 +53,8 @@ def ensemble_report(
 
     `final`: per column of the trajectory the statistics over the members alive at the end.
     `conserved`: per quantity the largest relative error of any member, whose it is, and the mean.
-    Nothing but `timing`, and engine and threads in `ensemble`, depends on who computed it.
+    Nothing but `timing`, `provenance`, and engine, threads, lanes and isa in `ensemble`, depends on
+    who computed it.
     """
     job, plan, description = origin.job, origin.plan, origin.description
     how = description.ensemble
