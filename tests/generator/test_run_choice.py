@@ -10,6 +10,7 @@ import pytest
 
 import hamotor
 from hamotor.bench.choice import tabulated
+from hamotor.bench.endpoint import ATTITUDE
 from hamotor.run.choice import TABLE, choose_method
 from hamotor.scene import METHODS, Form, methods_offered
 from hamotor.scene.methods import ALL
@@ -127,8 +128,11 @@ def test_an_account_is_reduced_to_what_is_cheapest() -> None:
         return [row(method, cost * 2**k, 10.0 ** (-order * k)) for k in range(9)]
 
     rows = [*ladder("rkmk4", 10, 1), *ladder("splitting2", 50, 2)]
-    said = tabulated({"targets": [1e-2, 1e-6], "rows": rows}, "heavy_top")
+    told = {"norm": ATTITUDE, "end_s": 1.5}
+    account = {"targets": [1e-2, 1e-6], "rows": rows, "problems": {"heavy_top": told}}
+    said = tabulated(account, "heavy_top")
     assert said["structure"] == "symmetric"
+    assert said["measured_on"] == "the first 1.5 s of heavy_top"
     names = {t: [e["method"] for e in entries] for t, entries in said["cheapest"].items()}
     assert names == {"0.01": ["rkmk4", "splitting2"], "1e-06": ["splitting2", "rkmk4"]}
     assert said["cheapest"]["1e-06"][0]["us"] == 50 * 8

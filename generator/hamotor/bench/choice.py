@@ -1,10 +1,11 @@
 """The table that `method = "auto"` reads, from measurements of `bench precision`.
 
-    python -m hamotor.bench.choice P1 P3 P4 planar two_bodies kirchhoff rocket
+    python -m hamotor.bench.choice P1 P3 P4 planar two_bodies@2 kirchhoff breathing_body rocket
 
-measures these scenes; accounts that there are already, `DIR/precision.json`, are taken as they are.
-A problem stands for the structure that its scene has.  Structures that no account covers keep what
-the table says of them; of several accounts of one structure the last counts.
+measures these scenes, `NAME@END` to this time (s) instead of the scene's own; accounts that there
+are already, `DIR/precision.json`, are taken as they are.  A problem stands for the structure that
+its scene has.  Structures that no account covers keep what the table says of them; of several
+accounts of one structure the last counts.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hamotor.bench.contest import Extent
 from hamotor.bench.precision import COMPILERS, measure
 from hamotor.bench.precision_report import by_contestant, meeting
-from hamotor.bench.problems import problem
+from hamotor.bench.problems import Problem, problem
 from hamotor.errors import UsageError
 from hamotor.run.choice import TABLE
 from hamotor.scene import METHODS
@@ -43,17 +45,20 @@ def tabulated(account: Mapping[str, Any], name: str) -> dict[str, Any]:
         and not rows[0]["form"]
         and rows[0]["compiler"].startswith("g++")
     }
+    told = account["problems"][name]
     cheapest = {}
     for target in account["targets"]:
         times = [
             (min(row["best_us"] for row in met), method)
             for method, ladder in ladders.items()
-            if (met := list(meeting(ladder, target)))
+            if (met := list(meeting(ladder, target, told["norm"])))
         ]
         cheapest[f"{target:g}"] = [
             {"method": method, "us": us} for us, method in sorted(times)[:_KEPT]
         ]
-    structure = structure_of(problem(name).scene)
+    measured = problem(name)
+    whole = told["end_s"] == measured.simulation.end
+    structure = structure_of(measured.scene)
     least = 2 if structure in _SPLIT else _ORDER_WITHOUT_SPLIT
     keeping = {
         m.name for m in METHODS if m.promises & ALL == ALL and (m.order >= least or m.order == 0)
@@ -65,7 +70,7 @@ def tabulated(account: Mapping[str, Any], name: str) -> dict[str, Any]:
             steps.append((1e3 * min(r["best_us"] / r["steps"] for r in rows), method))
     return {
         "structure": structure,
-        "measured_on": name,
+        "measured_on": name if whole else f"the first {told['end_s']:g} s of {name}",
         "cheapest": cheapest,
         "preserving": [
             {"method": method, "ns_per_step": ns}
@@ -73,6 +78,19 @@ def tabulated(account: Mapping[str, Any], name: str) -> dict[str, Any]:
             if structure not in ("forced", "rough")
         ],
     }
+
+
+def _problem(asked: str) -> Problem:
+    """NAME, or NAME@END: a motion may be chaotic over the scene's own time."""
+    name, _, end = asked.partition("@")
+    found = problem(name)
+    if not end:
+        return found
+    try:
+        seconds = float(end)
+    except ValueError:
+        raise UsageError(f'"{asked}": what follows @ is the end in seconds') from None
+    return replace(found, simulation=replace(found.simulation, end=seconds))
 
 
 def main(files: Sequence[str]) -> int:
@@ -86,7 +104,7 @@ def main(files: Sequence[str]) -> int:
         if file.endswith(".json"):
             account = json.loads(Path(file).read_text(encoding="utf-8"))
         else:
-            account = measure([problem(file)], _EXTENT, {}, {})
+            account = measure([_problem(file)], _EXTENT, {}, {})
         for name in account["problems"]:
             said = tabulated(account, name)
             structure = said.pop("structure")
