@@ -650,7 +650,8 @@ template <class S>
 [[nodiscard]] constexpr Turn<S> sin_cos(DoubleWord<S> angle) noexcept {
   const S moderate = constant([] { return power_of_two<S>(Limits<S>::digits - 8); });
   if (const auto small = abs(angle.hi) < moderate; !all(small)) {
-    const auto sum = two_sum(angle.hi, angle.lo);
+    // A low part that is larger still is not used, and could overflow the sum.
+    const auto sum = two_sum(angle.hi, select(abs(angle.lo) < S(4), angle.lo, S(0)));
     angle = {select(small, angle.hi, sum.hi), select(small, angle.lo, sum.lo)};
   }
   const S sine = sin(angle.hi);
