@@ -491,7 +491,7 @@ def _judged_at(
                 if wide <= bound:
                     notes.append(f"{told}, by roundings of its own: {wide:.1e} in {WIDE}")
                 else:
-                    failures.append(told)
+                    failures.append(f"{told}; {wide:.1e} in {WIDE}")
     unjudged: dict[str, str] = {}
     if verdict != "unresolved" and method in QUICK:
         found, wrong, why = _in_float(simulation, reference, method, error)
@@ -535,8 +535,8 @@ def _back(simulation: Simulation, method: str, end: Vector, steps: int) -> Vecto
 def _reversal_in_wide(simulation: Simulation, method: str, end: Vector, steps: int) -> float:
     """How far from the start as many steps there and back in the wider scalar arrive.
 
-    What a method promises but for rounding holds there, whatever larger numbers it rounds beside
-    those of the state.
+    Infinite where it stops.  What a method promises but for rounding holds there, whatever larger
+    numbers it rounds beside those of the state.
     """
     assert isinstance(simulation, Case)
     alone = replace(simulation, by_scalar={WIDE: (method,)}, compiled={})
