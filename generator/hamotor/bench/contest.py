@@ -8,10 +8,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+GIVEN = "equations generated from the scene"
+"""The representation of public solvers where no equations are written for them by hand."""
+
 
 @dataclass(frozen=True)
 class Form:
-    """How a scene is compiled; a public solver has a representation of its own."""
+    """How a scene is compiled; a public solver has a representation of its own, or `GIVEN`."""
 
     kernels: str = "generated"
     representation: str = "ga"
@@ -23,7 +26,8 @@ class Form:
     def label(self) -> str:
         """What distinguishes it from generated kernels of the scene's algebra in double."""
         words = (self.kernels, self.representation, self.algebra, self.scalar)
-        return ", ".join(w for w in words if w not in {"generated", "ga", "", "double", "own"})
+        usual = {"generated", "ga", "", "double", "own", GIVEN}
+        return ", ".join(w for w in words if w not in usual)
 
 
 OWN = Form()

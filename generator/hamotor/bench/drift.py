@@ -74,8 +74,8 @@ class Conserved:
         return self._observe(self._problem.simulation.state)
 
     def rows(self, states: Sequence[Sequence[float]]) -> Rows:
-        """Rows of states that are a quaternion and body rates, place and velocity if the body has
-        them: as the scene itself sees them."""
+        """Rows of states in the coordinates that public solvers have: as the scene itself sees
+        them."""
         return np.array([self._observe(self._state(x)) for x in states])
 
     def exact(self, interval: Fraction, samples: int) -> Rows | None:
@@ -97,6 +97,10 @@ class Conserved:
             return live.observe()
 
     def _state(self, x: Sequence[float]) -> list[float]:
+        """From generated equations', or a quaternion and body rates (place and velocity)."""
+        generated = self._problem.generated
+        if generated is not None:
+            return generated.state(x)
         (body,) = self._problem.scene.bodies
         rotor = rotor_of_quaternion(x[:4])
         kinetic = np.array(body.kinetic_matrix)[:3, :3]

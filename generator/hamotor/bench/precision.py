@@ -21,9 +21,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from hamotor.bench import endpoint, solvers
+from hamotor.bench import endpoint, equations, solvers
 from hamotor.bench.account import now_in_words, provenance, publish, say, write_whole
 from hamotor.bench.contest import (
+    GIVEN,
     OWN,
     Contestant,
     Extent,
@@ -225,7 +226,8 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
     if isinstance(one.for_peers, str):
         missing[f"public solvers on {one.name}"] = one.for_peers
     else:
-        contestants += solvers.contestants(one.name, compilers, peers, extent, missing)
+        given = one.generated.cpp if one.generated else ""
+        contestants += solvers.contestants(one.name, compilers, peers, extent, missing, given)
     if len(compilers) > 1:
         ours = [c for c in contestants if c.is_ours and not c.label]
         first = [asdict(row) for row in _times(one, ours, replace(extent, rounds=0))]
@@ -247,6 +249,7 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
             "reference": reference.source,
             "certificate": reference.certificate,
             "norm": one.norm,
+            "public_solvers": _formulation(one),
             "goals": list(GOALS.get(one.name, ())),
             "set_up": set_up,
             "scene": one.simulation.spec_hash,
@@ -257,6 +260,15 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
         "drift": [asdict(drift) for drift in long_runs],
         "missing": missing,
     }
+
+
+def _formulation(one: Problem) -> str:
+    """What public solvers integrate."""
+    if isinstance(one.for_peers, str):
+        return ""
+    if one.generated is None:
+        return "equations written by hand: quaternion and body rates, place and velocity if any"
+    return f"{GIVEN}: {one.generated.about}"
 
 
 def _longest_s(steps: int) -> float:
@@ -277,6 +289,8 @@ def _long_runs(
     step = step_of(simulation)
     longest_s = _longest_s(steps)
     asked = solvers.long_runs(contestants, compiler, step, steps, SAMPLES, longest_s / 2)
+    if one.generated is not None and one.generated.timed:
+        asked = []  # theirs are short runs, each from t = 0
     first, *_ = ours
     of = Conserved(one, SceneLibrary(Path(first.said["library"])), first.name)
     found: list[Drift] = []
@@ -442,13 +456,22 @@ def _times(one: Problem, contestants: Sequence[Contestant], extent: Extent) -> l
         ],
     }
     answers = solvers.timed(job)
+    ours = ((c.said["library"], c.name) for c in contestants if c.is_ours and not c.label)
+    observed_by = next(ours, ("", ""))
     return [
-        _row(contestants[contestant], setting, said, one)
+        _row(contestants[contestant], setting, said, one, observed_by)
         for (contestant, setting), said in sorted(answers.items())
     ]
 
 
-def _row(contestant: Contestant, index: int, said: Mapping[str, Any], one: Problem) -> Row:
+def _row(
+    contestant: Contestant,
+    index: int,
+    said: Mapping[str, Any],
+    one: Problem,
+    observed_by: tuple[str, str],
+) -> Row:
+    """`observed_by`: a library of the scene's and its method, which read the states of others."""
     setting = contestant.settings[index]
     what = "tolerance"
     if contestant.is_ours:
@@ -482,7 +505,7 @@ def _row(contestant: Contestant, index: int, said: Mapping[str, Any], one: Probl
         if contestant.is_ours:
             found = endpoint.of_row(contestant.said["description"], said["final"])
         else:
-            found = endpoint.of_quaternion(one.scene, said["final"])
+            found = one.end_of_peer(said["final"], observed_by)
         errors = endpoint.errors(found, one.reference.end)
     work = None
     if contestant.counted is not None:
@@ -535,6 +558,7 @@ def _provenance(
         with environment(CXX=compiler):
             versions[compiler] = find_compiler(default_cache()).version
     files = sorted(file for file in solvers.BENCH.iterdir() if file.is_file())
+    files.append(Path(equations.__file__))
     return provenance(
         bench=hashlib.sha256(b"\0".join(file.read_bytes() for file in files)).hexdigest(),
         compilers=versions,

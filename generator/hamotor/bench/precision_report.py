@@ -49,8 +49,11 @@ log error over log steps in the last two decades.
 Problems are measured one after the other; the date of each stands with its reference.
 A peer that is not installed is listed with the command that installs it; what a peer cannot \
 express is listed, too.
-Public solvers integrate a quaternion and body rates (place and velocity): 7 or 13 numbers; \
-engines of rigid bodies have their own coordinates.
+Public solvers integrate a quaternion and body rates (place and velocity), 7 or 13 numbers, where \
+that is written for them by hand; otherwise equations generated from the scene, in those of motors \
+and momenta, or of rotors, momenta and places, that take the fewest operations, with common parts \
+computed once; what they are stands with the problem. Nothing is normalised on the way, motors are \
+at the end. Engines of rigid bodies have their own coordinates.
 """.splitlines()
 
 
@@ -166,6 +169,8 @@ def table(account: Mapping[str, Any]) -> str:
     lines = ["time of a whole integration, best of the runs (worst in brackets); error at the end"]
     for name, said in account["problems"].items():
         lines += ["", f"{name}: {said['description']}, {said['end_s']:g} s; error: {said['norm']}"]
+        if said.get("public_solvers"):
+            lines.append(f"  public solvers have {said['public_solvers']}")
         lines.append(
             f"  {'error':>6}  {'ours, µs':>18}  {'by':<28}{'peer, µs':>18}  {'by':<28}"
             f"{'x':>6}{'goal':>7}"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -17,8 +17,10 @@ import numpy as np
 from hamotor.bench import endpoint
 from hamotor.bench.account import write_whole
 from hamotor.bench.endpoint import ATTITUDE, POSITION, Endpoint
+from hamotor.bench.equations import Equations, equations
 from hamotor.errors import HamotorError, UsageError
 from hamotor.run.build import default_cache, default_includes, headers_digest
+from hamotor.run.library import SceneLibrary
 from hamotor.run.simulation import Simulation, load
 from hamotor.scene import Scene, find_scene
 
@@ -98,8 +100,45 @@ class Problem:
 
     @cached_property
     def for_peers(self) -> Mapping[str, Any] | str:
-        """The numbers that public solvers are given, or why they are not."""
-        return _for_peers(self.scene)
+        """What public solvers are given, or why they are not: the numbers of the equations written
+        for them by hand, or else equations generated from the scene."""
+        by_hand = _for_peers(self.scene)
+        if not isinstance(by_hand, str):
+            return by_hand
+        generated = self.equations
+        if isinstance(generated, str):
+            return f"{by_hand}, and {generated}"
+        return {
+            "kind": "equations",
+            "python": generated.python,
+            "end": self.simulation.end,
+            "state": list(generated.start),
+        }
+
+    @cached_property
+    def equations(self) -> Equations | str:
+        """Those generated from the scene, or why there are none."""
+        return equations(self.scene)
+
+    @property
+    def generated(self) -> Equations | None:
+        """The same where public solvers are given them."""
+        given = self.for_peers
+        if isinstance(given, str) or given["kind"] != "equations":
+            return None
+        assert isinstance(self.equations, Equations)
+        return self.equations
+
+    def end_of_peer(self, state: Sequence[float], observed_by: tuple[str, str]) -> Endpoint:
+        """The end in a public solver's coordinates; `observed_by`: a library of the scene's and
+        its method."""
+        if self.generated is None:
+            return endpoint.of_quaternion(self.scene, state)
+        file, method = observed_by
+        library = SceneLibrary(Path(file))
+        of_scene = self.generated.state(state)
+        with library.start(method, step=self.simulation.end, state=np.array(of_scene)) as live:
+            return endpoint.of_row(library.description, live.observe())
 
 
 def problem(name: str) -> Problem:

@@ -14,7 +14,15 @@ from threading import Thread
 from typing import Any, Final
 
 from hamotor.bench.account import say
-from hamotor.bench.contest import Contestant, Extent, Form, environment, step_ladder, tolerances
+from hamotor.bench.contest import (
+    GIVEN,
+    Contestant,
+    Extent,
+    Form,
+    environment,
+    step_ladder,
+    tolerances,
+)
 from hamotor.bench.problems import ROOT
 from hamotor.errors import ToolError
 from hamotor.run.build import compile_scene, eigen
@@ -52,6 +60,7 @@ _DIFFRAX: Final = (
     " by XLA) took 7 to 190 ms for P4 with tolerances of 1e-4 to 1e-12 when tried, much as SciPy"
 )
 _THEIRS: Final = Form(kernels="", representation="own")
+_GIVEN: Final = Form(kernels="", representation=GIVEN)
 _ODEINT: Final = ("odeint rkf78", "odeint dopri5", "odeint Bulirsch-Stoer")
 _SUNDIALS: Final = ("CVODE Adams", "ARKODE ERK 5", "ARKODE ERK 8")
 _INCLUDES: Final = ("/usr/include", "/usr/local/include", "/opt/homebrew/include")
@@ -173,11 +182,17 @@ def _version_in(header: str, line: str) -> str | None:
     return None
 
 
-def compiled(compiler: str, file: str, *links: str) -> str:
-    """The library of one of the benchmark's C++ files."""
+def compiled(compiler: str, file: str, *links: str, equations: str = "") -> str:
+    """The library of one of the benchmark's C++ files; `equations`: for these, C++, alone."""
+    text = (BENCH / file).read_text(encoding="utf-8")
+    if equations:
+        text = (
+            '#include "problems.hpp"\n#define HAMOTOR_BENCH_EQUATIONS\n'
+            f"namespace bench {{\n{equations}}}\n{text}"
+        )
     with environment(CXX=compiler):
         built = compile_scene(
-            (BENCH / file).read_text(encoding="utf-8"),
+            text,
             includes=(BENCH,),
             libraries=(eigen(),),
             links=links,
@@ -186,18 +201,19 @@ def compiled(compiler: str, file: str, *links: str) -> str:
 
 
 def libraries(
-    compilers: Sequence[str], peers: Mapping[str, str], gaps: dict[str, str]
+    compilers: Sequence[str], peers: Mapping[str, str], gaps: dict[str, str], equations: str = ""
 ) -> list[tuple[str, str, str, Sequence[str]]]:
     """Solvers in C++ with controlled steps: compiler, family, library, names."""
     found: list[tuple[str, str, str, Sequence[str]]] = []
     for compiler in compilers:
         if "boost" in peers:
-            found.append((compiler, "odeint", compiled(compiler, "solvers.cpp"), _ODEINT))
+            library = compiled(compiler, "solvers.cpp", equations=equations)
+            found.append((compiler, "odeint", library, _ODEINT))
         if "sundials" not in peers:
             continue
         links = ("-lsundials_cvode", "-lsundials_arkode", "-lsundials_nvecserial")
         try:
-            library = compiled(compiler, "sundials.cpp", *links)
+            library = compiled(compiler, "sundials.cpp", *links, equations=equations)
             ctypes.CDLL(library)
         except (ToolError, OSError) as problem:
             gaps["SUNDIALS"] = f"{INSTALL_SUNDIALS}; {str(problem).splitlines()[0]}"
@@ -212,9 +228,12 @@ def contestants(
     peers: Mapping[str, str],
     extent: Extent,
     gaps: dict[str, str],
+    equations: str = "",
 ) -> list[Contestant]:
-    """The public solvers on one problem."""
+    """The public solvers on one problem; `equations`: those generated from it, C++, where none are
+    written by hand."""
     found = []
+    form = _GIVEN if equations else _THEIRS
 
     def add(
         who: str, family: str, kind: str, options: Mapping[str, Any], settings: Sequence[float],
@@ -224,19 +243,20 @@ def contestants(
         found.append(
             Contestant(
                 problem=name, name=who, family=family, compiler=compiler, kind=kind,
-                settings=settings, longest_s=longest_s, form=_THEIRS, options=label,
+                settings=settings, longest_s=longest_s, form=form, options=label,
                 fixed_steps=fixed, said={"options": options},
             )
         )  # fmt: skip
 
     steps = [float(s["calls"]) for s in step_ladder(1.0, extent)]
-    for compiler, family, library, names in libraries(compilers, peers, gaps):
+    for compiler, family, library, names in libraries(compilers, peers, gaps, equations):
         for solver in names:
             options: Mapping[str, Any] = {"library": library, "solver": solver}
             settings = tolerances(extent, 1e-16)
             add(solver, family, "compiled", options, settings, compiler=compiler)
         if family == "odeint":
-            for solver, of in (("Eigen rk4", "Eigen"), ("odeint rk4", "odeint")):
+            own_steps = (("Eigen rk4", "Eigen"), ("odeint rk4", "odeint"))
+            for solver, of in own_steps[1:] if equations else own_steps:
                 options = {"library": library, "solver": solver}
                 add(solver, of, "compiled", options, steps, compiler=compiler, fixed=True)
     if "heyoka" in peers:
@@ -249,6 +269,13 @@ def contestants(
         coarse = tolerances(extent, 3e-14)
         for method in ("DOP853", "LSODA"):
             add(f"SciPy {method}", "SciPy", "scipy", {"method": method}, coarse, slow)
+    if equations:
+        engines = [p for p in ("mujoco", "pin", "pybullet") if p in peers]
+        if engines:
+            gaps[f"{', '.join(engines)} on {name}"] = (
+                "models are written for one body alone: free, a top, or held by a spring"
+            )
+        return found
     if "mujoco" in peers:
         for integrator in ("RK4", "implicitfast"):
             who = f"MuJoCo {integrator}"

@@ -1,8 +1,9 @@
 """Public solvers on the reference problems, as their users would write them, tuned.
 
 Everyone integrates a quaternion (w, x, y, z) and body rates, 7 numbers, and for a body that moves
-also position and velocity in the world, 13; MuJoCo has its own. Imported by `stopwatch.py` in the
-peers' environment: nothing here needs Hamotor.
+also position and velocity in the world, 13; MuJoCo has its own.  Of other scenes solvers are given
+equations as Python text.  Imported by `stopwatch.py` in the peers' environment: nothing here needs
+Hamotor.
 """
 
 from __future__ import annotations
@@ -17,24 +18,43 @@ from typing import Any
 Vector = list[float]
 
 
+FUNCTIONS = (
+    "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
+    "tanh",
+)  # fmt: skip
+"""What equations may call."""
+
+
 class Refused(Exception):
     """A peer cannot do what it was asked; the text says why."""
 
 
 class Problem:
-    """A rigid body as `precision.py` describes it: kind free, top, sprung or loose."""
+    """A rigid body as `precision.py` describes it: kind free, top, sprung or loose; or `equations`
+    of any scene, as text."""
 
     def __init__(self, said: Mapping[str, Any]) -> None:
         self.kind: str = said["kind"]
-        self.moments: Vector = said["moments"]
-        self.mass: float = said["mass"]
-        self.gravity: float = said["gravity"]
-        self.height: float = said["height"]
-        self.stiffness: float = said["stiffness"]
-        self.rest_length: float = said["rest_length"]
-        self.at: Vector = said["at"]
+        self.python: str = said.get("python", "")
+        self.moments: Vector = said.get("moments", [0.0] * 3)
+        self.mass: float = said.get("mass", 0.0)
+        self.gravity: float = said.get("gravity", 0.0)
+        self.height: float = said.get("height", 0.0)
+        self.stiffness: float = said.get("stiffness", 0.0)
+        self.rest_length: float = said.get("rest_length", 0.0)
+        self.at: Vector = said.get("at", [0.0] * 3)
         self.end: float = said["end"]
         self.state: Vector = said["state"]
+
+    def rates(self, functions: Any = math) -> Callable[[Any, Sequence[Any]], list[Any]]:
+        """The time derivative of the state as a function of time and state, in numbers, or in
+        expressions that `functions` (a module) knows."""
+        if not self.python:
+            return lambda _, x: rates(self, x, functions.sqrt)
+        named: dict[str, Any] = {name: getattr(functions, name) for name in FUNCTIONS}
+        exec(self.python, named)  # noqa: S102 - which the generator wrote
+        found: Callable[[Any, Sequence[Any]], list[Any]] = named["rates"]
+        return found
 
     @property
     def moves(self) -> bool:
@@ -145,7 +165,7 @@ class Compiled:
     def run(self, repetitions: int) -> Result:
         """Integrate from the start `repetitions` times."""
         seconds, processor = ((ctypes.c_double * repetitions)() for _ in range(2))
-        state = (ctypes.c_double * 13)(*self._problem.state)
+        state = (ctypes.c_double * len(self._problem.state))(*self._problem.state)
         counts = (ctypes.c_int64 * 2)()
         refused = self._time(
             self._problem.kind.encode(), ctypes.byref(self._c), self._solver,
@@ -156,8 +176,7 @@ class Compiled:
             raise Refused("the solver gave up" if refused == 2 else "unknown solver")
         watch = Watch()
         watch.seconds, watch.processor = list(seconds), list(processor)
-        last = list(state)[: len(self._problem.state)]
-        return Result(watch, last, counts[0], counts[1])
+        return Result(watch, list(state), counts[0], counts[1])
 
 
 class Heyoka:
@@ -165,9 +184,8 @@ class Heyoka:
 
     def __init__(self, problem: Problem, setting: float, *, fast_math: bool) -> None:
         heyoka = importlib.import_module("heyoka")
-        names = ["qw", "qx", "qy", "qz", "wx", "wy", "wz", "x", "y", "z", "vx", "vy", "vz"]
-        variables = heyoka.make_vars(*names[: len(problem.state)])
-        found = rates(problem, variables, heyoka.sqrt)
+        variables = heyoka.make_vars(*(f"x{i}" for i in range(len(problem.state))))
+        found = problem.rates(heyoka)(heyoka.time, variables)
         zero = heyoka.expression(0.0)
         began = time.perf_counter()
         self._integrator = heyoka.taylor_adaptive(
@@ -217,8 +235,10 @@ class SciPy:
         problem = self._problem
         relative = max(self._setting, 3e-14)  # the least that it takes
 
-        def rate(_: float, x: Any) -> list[Any]:
-            return rates(problem, x.tolist())
+        rates = problem.rates()
+
+        def rate(t: float, x: Any) -> list[Any]:
+            return rates(t, x.tolist())
 
         def solve() -> Any:
             return self._solve(

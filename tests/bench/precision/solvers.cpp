@@ -99,7 +99,9 @@ struct Solvers {
     if (name == "odeint dopri5") return dopri5<Rates>;
     if (name == "odeint Bulirsch-Stoer") return bulirsch_stoer<Rates>;
     if (name == "odeint rk4") return odeint_rk4<Rates>;
+#ifndef HAMOTOR_BENCH_EQUATIONS  // which hold no quaternion to normalise
     if (name == "Eigen rk4") return eigen_rk4<Rates>;
+#endif
     return nullptr;
   }
 };

@@ -45,9 +45,10 @@ int time_runs(Solver<Rates> solver, const Problem& problem, double end, double s
 
 /// Runs solver `name` of `Solvers` `repetitions` times from `state` to `end` and writes the seconds
 /// of each and how many of them it had the processor; then once more to count, and writes the last
-/// state, steps and evaluations.  `kind`: free, top, sprung or loose (sprung, with a rest length).
-/// `setting`: the tolerance, of fixed steps their number.  Returns 0; 1 for what is not known; 2 if
-/// the solver gave up.
+/// state, steps and evaluations.  `kind`: free, top, sprung or loose (sprung, with a rest length);
+/// or, with HAMOTOR_BENCH_EQUATIONS, only equations: those of a class `Equations`. `setting`: the
+/// tolerance, of fixed steps their number.  Returns 0; 1 for what is not known; 2 if the solver
+/// gave up.
 template <class Solvers>
 int time_solver(std::string_view kind, const Problem& problem, std::string_view name, double end,
                 double setting, std::int64_t repetitions, double* seconds, double* processor,
@@ -56,10 +57,14 @@ int time_solver(std::string_view kind, const Problem& problem, std::string_view 
     return time_runs(solver, problem, end, setting, repetitions, seconds, processor, state, counts);
   };
   try {
+#ifdef HAMOTOR_BENCH_EQUATIONS
+    if (kind == "equations") return runs(Solvers::template find<Equations>(name));
+#else
     if (kind == "free") return runs(Solvers::template find<Free>(name));
     if (kind == "top") return runs(Solvers::template find<Top>(name));
     if (kind == "sprung") return runs(Solvers::template find<Sprung<false>>(name));
     if (kind == "loose") return runs(Solvers::template find<Sprung<true>>(name));
+#endif
   } catch (...) {  // odeint throws when a step cannot be made small enough
     return 2;
   }
