@@ -55,7 +55,7 @@ def _motion(scene: GeneralScene, state: list[float], t: float) -> list[float]:
     return rates
 
 
-@pytest.mark.parametrize("name", ["planar", "manakov", "rocket", "kepler"])
+@pytest.mark.parametrize("name", ["planar", "manakov", "rocket", "tumbling_debris"])
 def test_equations_are_the_motion_of_motors_and_momenta(name: str) -> None:
     scene = _general(name)
     found = equations(scene)
@@ -63,7 +63,8 @@ def test_equations_are_the_motion_of_motors_and_momenta(name: str) -> None:
     assert found.state(found.start) == pytest.approx(list(scene.initial_state), abs=1e-14)
     given = {"kind": "equations", "python": found.python, "end": 1.0, "state": []}
     rates = peers.Problem(given).rates()
-    x, t, h = np.array(found.start), 0.3, 1e-4
+    t, h = 0.3, 1e-4
+    x: Any = np.array(found.start)
     for _ in range(200):  # away from what a start has of zeros, by midpoints
         x = x + h * np.array(rates(t, list(x + h / 2 * np.array(rates(t, list(x))))))
     along = np.array(rates(t, list(x)))

@@ -7,12 +7,16 @@ C++ for Boost.odeint and SUNDIALS.  Common parts are local variables, so that al
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Final
 
-from hamotor.codegen.algebra import reverse_sign
+import numpy as np
+from numpy.typing import NDArray
+
+from hamotor.codegen.algebra import Algebra, reverse_sign
 from hamotor.codegen.program import (
     Call,
     Expression,
@@ -30,7 +34,8 @@ from hamotor.mechanics.body_frame import Unsuitable
 from hamotor.mechanics.flow import WORK, Flow, body_flow, motor_flow, world_flow
 from hamotor.mechanics.system import System
 from hamotor.scene import Scene
-from hamotor.scene.general import GeneralBody, GeneralScene
+from hamotor.scene.general import GeneralBody, GeneralScene, product
+from hamotor.scene.principal_system import principal_system
 
 SMOOTH: Final = (
     "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh",
@@ -41,6 +46,69 @@ SMOOTH: Final = (
 _PER_CALL: Final = 10
 _PER_COORDINATE: Final = 8
 """Operations that a function, and what a solver does with a coordinate, weigh in the choice."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The motor N of the frame that a body's equations are in, seen from the scene's own."""
+
+    body: GeneralBody
+    motor: Sequence[float] | None
+    """None: the same frame."""
+
+    def enter(self, motor: Sequence[float], momentum: Sequence[float]) -> list[float]:
+        """M N and N~ μ N."""
+        if self.motor is None:
+            return [*motor, *momentum]
+        moved = product(self._algebra, self._whole(motor), self._whole(self.motor))
+        return [*self._components(moved), *map(float, self._adjoint.T @ np.array(momentum))]
+
+    def back(self, motor: Sequence[float], momentum: Sequence[float]) -> list[float]:
+        """M and μ of these."""
+        if self.motor is None:
+            return [*motor, *momentum]
+        moved = product(self._algebra, self._whole(motor), _reverse(self._whole(self.motor)))
+        own = np.linalg.solve(self._adjoint.T, np.array(momentum))
+        return [*self._components(moved), *map(float, own)]
+
+    @property
+    def _algebra(self) -> Algebra:
+        return self.body.coordinates.algebra
+
+    @cached_property
+    def _adjoint(self) -> NDArray[np.float64]:
+        """Column a: N E_a N~ by generators, which are a blade each."""
+        assert self.motor is not None
+        n = self._whole(self.motor)
+        blades = [dict(g.bivector) for g in self.body.coordinates.group.generators]
+        turned = [
+            product(self._algebra, product(self._algebra, n, _floats(e)), _reverse(n))
+            for e in blades
+        ]
+        return np.array(
+            [[t.get(b, 0.0) / float(x) for t in turned] for e in blades for b, x in e.items()]
+        )
+
+    def _whole(self, motor: Sequence[float]) -> dict[int, float]:
+        whole: dict[int, float] = {}
+        for x, c in zip(motor, self.body.coordinates.group.element.components, strict=True):
+            for blade, y in c.embedding.items():
+                whole[blade] = whole.get(blade, 0.0) + x * float(y)
+        return whole
+
+    def _components(self, whole: dict[int, float]) -> list[float]:
+        return [
+            math.fsum(float(y) * whole.get(blade, 0.0) for blade, y in reading.items())
+            for reading in self.body.coordinates.group.element.reading
+        ]
+
+
+def _reverse(whole: dict[int, float]) -> dict[int, float]:
+    return {blade: reverse_sign(blade) * x for blade, x in whole.items()}
+
+
+def _floats(whole: Mapping[int, Any]) -> dict[int, float]:
+    return {blade: float(x) for blade, x in whole.items()}
 
 
 @dataclass(frozen=True)
@@ -58,10 +126,12 @@ class Equations:
     timed: bool
     """Whether f holds t."""
     names: tuple[str, ...]
+    operations: int
     leave: Program
     bodies: tuple[GeneralBody, ...]
+    frames: tuple[Frame, ...]
 
-    def state(self, x: Sequence[float]) -> list[float]:
+    def state(self, x: Sequence[float] | NDArray[np.float64]) -> list[float]:
         """Motors and momenta in the order of the scene's state; each motor divided by √⟨M M~⟩₀, as
         a quaternion is by its length."""
         known = dict(zip(self.names, map(float, x), strict=True))
@@ -73,7 +143,10 @@ class Equations:
                     known[name] /= size
         numbers = {f"x[{i}]": value for i, value in enumerate(known.values())}
         found = self.leave.evaluate(numbers, _FLOATS)
-        return [float(found[name]) for k, body in enumerate(self.bodies) for name in _told(body, k)]
+        state: list[float] = []
+        for k, (body, frame) in enumerate(zip(self.bodies, self.frames, strict=True)):
+            state += frame.back(*([found[name] for name in names] for names in _told(body, k)))
+        return state
 
 
 _FLOATS: Final[dict[str, Any]] = {
@@ -83,15 +156,23 @@ _FLOATS: Final[dict[str, Any]] = {
 
 
 def equations(scene: Scene | GeneralScene) -> Equations | str:
-    """Those with the fewest operations of the coordinates that there are, in the body frames of the
-    scene's file; or why there are none."""
+    """Those with the fewest operations of the coordinates that there are, of rigid bodies in their
+    principal frames; or why there are none."""
     general = scene.general if isinstance(scene, Scene) else scene
     if general.lagrangian is not None:
         return (
             "L has no Legendre transform in formulas: its rates are found by iterations at every "
             "step, so that there are no equations to hand over"
         )
-    about, flow = min(_flows(general.system), key=lambda found: _weight(found[1]))
+    frames = tuple(Frame(body, None) for body in general.bodies)
+    system = general.system
+    if isinstance(scene, Scene):
+        frames = tuple(
+            Frame(body, None if own.principal.is_body_frame else own.principal.motor)
+            for body, own in zip(general.bodies, scene.bodies, strict=True)
+        )
+        system = principal_system(scene)
+    about, flow = min(_flows(system), key=lambda found: _weight(found[1]))
     unknown = sorted(flow.field.cost.calls.keys() - set(SMOOTH))
     if unknown:
         return f"the motion is not smooth: it holds {', '.join(unknown)}"
@@ -102,10 +183,12 @@ def equations(scene: Scene | GeneralScene) -> Equations | str:
     ).without_unused()
     field = renamed(field, {name: f"x{i}" for i, name in enumerate(names)})
     kept = [i for i, name in enumerate(flow.coordinates) if name in names]
-    told = [name for k, body in enumerate(general.bodies) for name in _told(body, k)]
-    entered = flow.enter.evaluate(
-        {**dict(zip(told, map(float, general.initial_state), strict=True)), "t": 0.0}, _FLOATS
-    )
+    start = {"t": 0.0}
+    for k, (body, frame) in enumerate(zip(general.bodies, frames, strict=True)):
+        motor, momentum = _told(body, k)
+        seen = frame.enter(body.motor, body.momentum)
+        start |= dict(zip([*motor, *momentum], seen, strict=True))
+    entered = flow.enter.evaluate(start, _FLOATS)
     leave = renamed(flow.leave, {f"x[{old}]": f"x[{new}]" for new, old in enumerate(kept)})
     return Equations(
         about=f"{about}: {len(names)} numbers, {field.cost}",
@@ -114,8 +197,10 @@ def equations(scene: Scene | GeneralScene) -> Equations | str:
         start=tuple(float(entered[f"x[{i}]"]) for i in kept),
         timed="t" in _read(field),
         names=names,
+        operations=field.cost.total,
         leave=leave,
         bodies=general.bodies,
+        frames=frames,
     )
 
 
@@ -134,10 +219,10 @@ def _weight(flow: Flow) -> int:
     return cost.total + _PER_CALL * calls + _PER_COORDINATE * len(flow.coordinates)
 
 
-def _told(body: GeneralBody, k: int) -> list[str]:
+def _told(body: GeneralBody, k: int) -> tuple[list[str], list[str]]:
     group = body.coordinates.group
     motor = [f"m{k}.{c.name}" for c in group.element.components]
-    return [*motor, *(f"mu{k}.{g.momentum}" for g in group.generators)]
+    return motor, [f"mu{k}.{g.momentum}" for g in group.generators]
 
 
 def _square(body: GeneralBody, k: int, known: dict[str, float]) -> float:

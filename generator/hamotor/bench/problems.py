@@ -111,6 +111,7 @@ class Problem:
         return {
             "kind": "equations",
             "python": generated.python,
+            "operations": generated.operations,
             "end": self.simulation.end,
             "state": list(generated.start),
         }

@@ -36,6 +36,7 @@ class Problem:
     def __init__(self, said: Mapping[str, Any]) -> None:
         self.kind: str = said["kind"]
         self.python: str = said.get("python", "")
+        self.operations: int = said.get("operations", 0)
         self.moments: Vector = said.get("moments", [0.0] * 3)
         self.mass: float = said.get("mass", 0.0)
         self.gravity: float = said.get("gravity", 0.0)
@@ -179,6 +180,11 @@ class Compiled:
         return Result(watch, list(state), counts[0], counts[1])
 
 
+_UNROLLED = 250
+"""Beyond so many operations heyoka's unrolled code takes more than seconds to compile, each time
+that its order changes."""
+
+
 class Heyoka:
     """Taylor series of heyoka.py; `setting` is the tolerance, from which its order follows."""
 
@@ -192,7 +198,7 @@ class Heyoka:
             [(v, zero + r) for v, r in zip(variables, found, strict=True)],
             problem.state,
             tol=setting,
-            compact_mode=False,
+            compact_mode=problem.operations > _UNROLLED,
             fast_math=fast_math,
         )
         self.set_up_s = time.perf_counter() - began
