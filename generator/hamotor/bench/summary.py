@@ -20,6 +20,7 @@ from hamotor.bench.solvers import install_peers, peers_here
 METHODS: Final = ("taylor", "splitting4", "splitting8", "rkmk4")
 PROBLEM: Final = "P4"
 TARGETS: Final = (1e-4, 1e-8, 1e-12)
+_WORDS: Final = {what: f"move a {what}" for what in ("point", "direction", "plane", "line")}
 
 
 def bench_summary(
@@ -46,7 +47,7 @@ def summary(kernels: Mapping[str, Any], precision: Mapping[str, Any]) -> str:
     """Both accounts in some thirty lines."""
     lines = [
         "Kernels: generated code beside the best Eigen, one operation waiting for the last, double",
-        f"  {'':<24}{'generated':>12}{'Eigen':>10}{'ratio':>8}{'error':>10}",
+        f"  {'':<24}{'generated':>12}{'Eigen':>10}{'ratio':>8}{'error':>10}{'Eigen':>8}",
     ]
     chosen = [r for r in kernels["rows"] if r["mode"] == "latency" and r["scalar"] == "double"]
     for operation in dict.fromkeys(row["operation"] for row in chosen):
@@ -56,11 +57,16 @@ def summary(kernels: Mapping[str, Any], precision: Mapping[str, Any]) -> str:
         if not ours or baseline is None:
             continue
         fastest = min(ours, key=lambda row: row["ns"])
+        theirs = next(row for row in here if row["ns"] == baseline)
         lines.append(
-            f"  {operation:<24}{fastest['ns']:>9.1f} ns{baseline:>7.1f} ns"
+            f"  {_WORDS.get(operation, operation):<24}{fastest['ns']:>9.1f} ns{baseline:>7.1f} ns"
             f"{fastest['ns'] / baseline:>8.2f}{fastest['max_relative_error']:>10.0e}"
+            f"{theirs['max_relative_error']:>8.0e}"
         )
-    lines += ["  below 1 is faster than Eigen; error: the largest, relative, of 1000 inputs", ""]
+    lines += [
+        "  below 1 is faster than Eigen; error: the largest, relative, of 1000 inputs, and Eigen's",
+        "",
+    ]
     (name, said), *_ = precision["problems"].items()
     lines.append(
         f"Motion: {said['description']}, {said['end_s']:g} s; what an error at its end costs"
@@ -74,7 +80,11 @@ def summary(kernels: Mapping[str, Any], precision: Mapping[str, Any]) -> str:
             + (f"{our.microseconds:>7.0f} µs  {our.name:<22}" if our else f"{'-':>10}  {'':<22}")
             + (f"{their.microseconds:>11.0f} µs  {their.name}" if their else f"{'-':>14}")
         )
-    lines += [f"  not compared: {who}: {why}" for who, why in precision["not_there"].items()]
+    lines += [
+        f"  not compared: {who}: {why}"
+        for who, why in precision["not_there"].items()
+        if not why.startswith("left out")
+    ]
     before = said["set_up"]
     lines.append(
         f"  before the first step, once: {before['generate_s']:.1f} s to generate,"
