@@ -1,8 +1,9 @@
 """`hamotor bench steps`: whole steps of scenes, by kernels, representation and method, with errors.
 
 Every contestant steps the same scene from the same state with the same step; repetitions are
-interleaved, and a time is the best of them, since what else runs only adds to it. The error is the distance at the end from a run in
-`long double` with shorter steps, of order 8 where the scene has it.
+interleaved, and a time is the best of them, since what else runs only adds to it. The error is the
+distance at the end from a run in `long double` with shorter steps, of order 8 where the scene has
+it.
 """
 
 from __future__ import annotations
