@@ -55,7 +55,7 @@ def _motion(scene: GeneralScene, state: list[float], t: float) -> list[float]:
     return rates
 
 
-@pytest.mark.parametrize("name", ["planar", "manakov", "rocket", "tumbling_debris"])
+@pytest.mark.parametrize("name", ["planar", "manakov", "rocket", "two_bodies"])
 def test_equations_are_the_motion_of_motors_and_momenta(name: str) -> None:
     scene = _general(name)
     found = equations(scene)
