@@ -261,7 +261,7 @@ def _add_run(parser: _Parser) -> None:
         "--kernels",
         metavar="K",
         default="generated",
-        help="generated|generic: generic ones are tables, to compare with",
+        help="generated|generic|sparse: by table, whole or what types need of it, to compare with",
     )
     parser.add_argument("--out", metavar="DIR", help="where to write (default: runs/SCENE)")
     parser.add_argument("--csv", action="store_true", help="write trajectory.csv as well")

@@ -60,6 +60,7 @@ _LONGEST_RUN_S: Final = 10.0
 
 _FORMS: Final = (
     (Form(kernels="generic"), ("rkmk4", "rk4", "rkmk87", "gauss6")),
+    (Form(kernels="sparse"), ("rkmk4", "rk4", "rkmk87", "gauss6")),
     (Form(representation="matrix"), ("rkmk4", "rk4")),
     (Form(algebra="conformal"), ("rkmk4", "rk4", "rkmk87", "gauss6", "taylor")),
     (Form(scalar="float"), ("rkmk4", "splitting4", "gauss6")),

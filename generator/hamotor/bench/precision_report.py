@@ -33,12 +33,12 @@ row take longer than 15 ms (4 ms if quick), 40 times that where the solver is ca
 Scenes and solvers in C++ are compiled with -O3 -march=native, those that lead by each compiler, \
 of which the faster counts.
 Evaluations are those of rates or forques, and of a Taylor series its order. Operations are \
-counted by a run with numbers that count, from the first 200 steps: generated and generic \
-kernels and conformal algebra in double; of other scalars, of matrices and of public solvers \
-nobody counts.
+counted by a run with numbers that count, from the first 200 steps: generated, generic and \
+sparse kernels and conformal algebra in double; of other scalars, of matrices and of public \
+solvers nobody counts.
 A scene in conformal algebra is a general one, with a whole gradient, as is one with generic \
-kernels (dense multivectors by table; sparse tables are measured by `bench kernels`): neither \
-knows principal axes.
+kernels (dense multivectors, by the whole table, or "sparse", by the part of it that the types of \
+the operands need): neither knows principal axes.
 Scalars wider than a double start from doubles and are read in doubles here: they show rounding, \
 not more digits.
 Long runs take the scene's step; solvers with a tolerance take 1e-14 and their own steps for the \

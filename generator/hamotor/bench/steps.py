@@ -44,9 +44,11 @@ QUICK_ORDER: Final = 8
 FORMS: Final = {
     "generated": ("generated", "ga"),
     "generic": ("generic", "ga"),
+    "sparse": ("sparse", "ga"),
     "matrix": ("generated", "matrix"),
 }
-"""What a scene is compiled to, unrolled kernels, tables, or matrices: kernels, representation."""
+"""What a scene is compiled to, unrolled kernels, tables, the part of them that is needed, or
+matrices: kernels, representation."""
 
 
 @dataclass(frozen=True)

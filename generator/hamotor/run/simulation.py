@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from hamotor.scene import Form, GeneralScene, Scene
     from hamotor.scene.building import BodyWords
 
-KERNELS = ("generated", "generic")
+KERNELS = ("generated", "generic", "sparse")
 REPRESENTATIONS = ("ga", "matrix")
 
 ROWS = 1000
@@ -214,7 +214,8 @@ class Simulation:
         errors of what is conserved are theirs, while the trajectory stays in doubles.
 
         `kernels` "generic" runs the same scene with nothing generated but its Hamiltonian: products
-        of dense multivectors by table, slow, to compare with.
+        of dense multivectors by table, slow, to compare with; "sparse" takes of the table only what
+        the operands' types need.
         `representation` "matrix" runs the scene in the classical form (R, x, Π, P) instead of
         motors, where its group is SE(3), SO(3) or SE(2): the same columns, for comparison.
 

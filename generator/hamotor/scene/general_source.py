@@ -75,7 +75,8 @@ def general_source(
 ) -> str:
     """The text of the C++ file that defines a scene over the runtime's headers.
 
-    kernels: `generated`, or `generic`: products by table, of dense multivectors.
+    kernels: `generated`, or `generic`: products by table, of dense multivectors, or `sparse`: by
+    the part of the table that the operands' types can need.
     method: the one that it is for.
     drawn: the parameters that members differ in stay variables of the system.
 
@@ -85,7 +86,7 @@ def general_source(
     scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = System(scene.hamiltonian, scene.drawn) if drawn else scene.system
     first = scene.bodies[0].coordinates
-    by_name = kernels == "generic"
+    by_name = kernels != "generated"
     group_type = f"hamotor::{scene.algebra}::{scene.group.name}"
     if by_name:
         group_type = "hamotor::generic::Group<Tables>"
@@ -114,7 +115,7 @@ def general_source(
         scene=scene,
         kernels=kernels,
         scalar=scalar,
-        tables=_tables(first) if kernels == "generic" else None,
+        tables=_tables(first) if by_name else None,
         headers=scene.headers,
         header=f"hamotor/{scene.algebra}/{scene.group.name.lower()}.hpp",
         algebra=scene.algebra,

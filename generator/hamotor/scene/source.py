@@ -16,7 +16,7 @@ from hamotor.scene.motors import Vector
 from hamotor.scene.scalars import Scalar, parse_scalar
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
-KERNELS = ("generated", "generic")
+KERNELS = ("generated", "generic", "sparse")
 SMALLEST_FLOAT, LARGEST_FLOAT = 1e-18, 1e18
 """Masses and moments beyond these have products that overflow in single precision."""
 
@@ -42,7 +42,7 @@ def scene_source(
             f"{suggest(kernels, KERNELS)}"
         )
     numbers = parse_scalar(scalar)
-    if not isinstance(scene, Scene) or kernels == "generic" or form == "drawn":
+    if not isinstance(scene, Scene) or kernels != "generated" or form == "drawn":
         from hamotor.scene.general_source import general_source
 
         return general_source(scene, kernels, numbers, method, drawn=form == "drawn")

@@ -1,12 +1,14 @@
 // Groups of rotors with nothing generated: every function is a product of dense multivectors, all
-// 2ⁿ components, by table.  Slow by design: what generated kernels are measured against, and
-// checked against in whole runs.
+// 2ⁿ components, by table, or by the part of the table that the operands' types can need.  Slow by
+// design: what generated kernels are measured against, and checked against in whole runs.
 //
 // A struct of tables says which group: `vectors` (n), `gram`, the layouts `Element`, `Rate` and
-// `Momentum`, and `algebra`, `name`, `generators`.
+// `Momentum`, `algebra`, `name`, `generators`, and whether products are `sparse`.
 #pragma once
 
 #include <array>
+#include <bit>
+#include <bitset>
 #include <concepts>
 #include <cstddef>
 #include <string_view>
@@ -124,18 +126,46 @@ template <class Named, class Value>
 
 namespace detail {
 
-/// Every term of the geometric product, made when first asked for.
+/// Which blades of a multivector may be other than 0, a bit each.
 template <class Tables>
-[[nodiscard]] const std::vector<Term>& geometric_terms() {
-  static const std::vector<Term> terms =
-      Algebra<Tables::vectors>(Tables::gram).terms(Product::geometric);
-  return terms;
-}
+using Blades = std::bitset<std::size_t{1} << Tables::vectors>;
 
-template <class Tables, class S>
+/// The blades of a type with components.
+template <class Tables, class Layout>
+struct Held {
+  [[nodiscard]] static Blades<Tables> blades() {
+    Blades<Tables> all;
+    for (const Entry& e : Layout::embedding) all.set(e.blade);
+    return all;
+  }
+};
+
+/// The terms of a product of operands that hold certain blades, made when first asked for.
+template <class Tables, class A, class B>
+struct ProductOf {
+  [[nodiscard]] static const std::vector<Term>& terms() {
+    static const std::vector<Term> needed = [] {
+      auto all = Algebra<Tables::vectors>(Tables::gram).terms(Product::geometric);
+      if constexpr (Tables::sparse) {
+        const auto a = A::blades();
+        const auto b = B::blades();
+        std::erase_if(all, [&](const Term& t) { return !a[t.a] || !b[t.b]; });
+      }
+      return all;
+    }();
+    return needed;
+  }
+  [[nodiscard]] static Blades<Tables> blades() {
+    Blades<Tables> all;
+    for (const Term& t : terms()) all.set(t.c);
+    return all;
+  }
+};
+
+template <class Tables, class S, class A, class B>
 [[gnu::noinline]] Multivector<Tables::vectors, S> product(
     const Multivector<Tables::vectors, S>& a, const Multivector<Tables::vectors, S>& b) noexcept {
-  return multiply<Tables::vectors, S>(geometric_terms<Tables>(), a, b);
+  return multiply<Tables::vectors, S>(ProductOf<Tables, A, B>::terms(), a, b);
 }
 
 template <class Multivector>
@@ -147,13 +177,23 @@ template <class Multivector>
 }
 
 /// ab − ba.
-template <class Tables, class S>
+template <class Tables, class S, class A, class B>
 [[nodiscard]] Multivector<Tables::vectors, S> bracket(
     const Multivector<Tables::vectors, S>& a, const Multivector<Tables::vectors, S>& b) noexcept {
-  auto result = product<Tables, S>(a, b);
-  const auto back = product<Tables, S>(b, a);
+  auto result = product<Tables, S, A, B>(a, b);
+  const auto back = product<Tables, S, B, A>(b, a);
   for (std::size_t k = 0; k < result.size(); ++k) result[k] -= back[k];
   return result;
+}
+
+/// M x M~ for an x of one of the group's types.
+template <class Tables, class S, class Layout>
+[[nodiscard]] Multivector<Tables::vectors, S> moved(
+    const Multivector<Tables::vectors, S>& m, const Multivector<Tables::vectors, S>& x) noexcept {
+  using M = Held<Tables, typename Tables::Element>;
+  using Half = ProductOf<Tables, M, Held<Tables, Layout>>;
+  return product<Tables, S, Half, M>(product<Tables, S, M, Held<Tables, Layout>>(m, x),
+                                     reversed(m));
 }
 
 /// Only what the components hold: a momentum is a coset, and brackets cancel but for rounding.
@@ -167,7 +207,8 @@ template <class Value, class Multivector>
 template <class Tables, class S>
 [[nodiscard]] ElementOf<Tables, S> gp(const ElementOf<Tables, S>& a,
                                       const ElementOf<Tables, S>& b) noexcept {
-  return ElementOf<Tables, S>(detail::product<Tables, S>(a.values, b.values));
+  using M = detail::Held<Tables, typename Tables::Element>;
+  return ElementOf<Tables, S>(detail::product<Tables, S, M, M>(a.values, b.values));
 }
 
 template <class Tables, class S>
@@ -179,29 +220,35 @@ template <class Tables, class S>
 template <class Tables, class S>
 [[nodiscard]] ElementOf<Tables, S> kinematics(const ElementOf<Tables, S>& m,
                                               const RateOf<Tables, S>& w) noexcept {
-  return ElementOf<Tables, S>(detail::product<Tables, S>(m.values, w.values));
+  using M = detail::Held<Tables, typename Tables::Element>;
+  using W = detail::Held<Tables, typename Tables::Rate>;
+  return ElementOf<Tables, S>(detail::product<Tables, S, M, W>(m.values, w.values));
 }
 
 /// [a, b] = ab − ba.
 template <class Tables, class S>
 [[nodiscard]] RateOf<Tables, S> ad(const RateOf<Tables, S>& a,
                                    const RateOf<Tables, S>& b) noexcept {
-  return detail::held<RateOf<Tables, S>>(detail::bracket<Tables, S>(a.values, b.values));
+  using W = detail::Held<Tables, typename Tables::Rate>;
+  return detail::held<RateOf<Tables, S>>(detail::bracket<Tables, S, W, W>(a.values, b.values));
 }
 
 /// ad*_w μ = [μ, w].
 template <class Tables, class S>
 [[nodiscard]] MomentumOf<Tables, S> coadjoint(const RateOf<Tables, S>& w,
                                               const MomentumOf<Tables, S>& mu) noexcept {
-  return detail::held<MomentumOf<Tables, S>>(detail::bracket<Tables, S>(mu.values, w.values));
+  using Mu = detail::Held<Tables, typename Tables::Momentum>;
+  using W = detail::Held<Tables, typename Tables::Rate>;
+  return detail::held<MomentumOf<Tables, S>>(
+      detail::bracket<Tables, S, Mu, W>(mu.values, w.values));
 }
 
 /// M μ M~: a body momentum as a spatial one.
 template <class Tables, class S>
 [[nodiscard]] MomentumOf<Tables, S> Ad_star_inverse(const ElementOf<Tables, S>& m,
                                                     const MomentumOf<Tables, S>& mu) noexcept {
-  return detail::held<MomentumOf<Tables, S>>(detail::product<Tables, S>(
-      detail::product<Tables, S>(m.values, mu.values), detail::reversed(m.values)));
+  return detail::held<MomentumOf<Tables, S>>(
+      detail::moved<Tables, S, typename Tables::Momentum>(m.values, mu.values));
 }
 
 /// M~ μ M: a spatial momentum as a body one.
@@ -215,8 +262,8 @@ template <class Tables, class S>
 template <class Tables, class S>
 [[nodiscard]] RateOf<Tables, S> Ad(const ElementOf<Tables, S>& m,
                                    const RateOf<Tables, S>& w) noexcept {
-  return detail::held<RateOf<Tables, S>>(detail::product<Tables, S>(
-      detail::product<Tables, S>(m.values, w.values), detail::reversed(m.values)));
+  return detail::held<RateOf<Tables, S>>(
+      detail::moved<Tables, S, typename Tables::Rate>(m.values, w.values));
 }
 
 /// μ(w).
@@ -232,6 +279,8 @@ template <class Tables, class S>
 /// exp w by its series, of w halved until it is small, and squaring.
 template <class Tables, class S>
 [[nodiscard]] ElementOf<Tables, S> exp(const RateOf<Tables, S>& w) noexcept {
+  using M = detail::Held<Tables, typename Tables::Element>;
+  using W = detail::Held<Tables, typename Tables::Rate>;
   S size(0);
   for (const S& x : w.values) size = scalar::max_abs(size, x);
   int halvings = 0;
@@ -245,7 +294,7 @@ template <class Tables, class S>
   sum[0] = S(1);
   auto term = sum;
   for (int k = 1; k < 40; ++k) {
-    term = detail::product<Tables, S>(term, small);
+    term = detail::product<Tables, S, M, W>(term, small);
     bool changed = false;
     for (std::size_t blade = 0; blade < sum.size(); ++blade) {
       term[blade] /= static_cast<S>(k);
@@ -255,14 +304,15 @@ template <class Tables, class S>
     }
     if (!changed) break;
   }
-  for (; halvings > 0; --halvings) sum = detail::product<Tables, S>(sum, sum);
+  for (; halvings > 0; --halvings) sum = detail::product<Tables, S, M, M>(sum, sum);
   return ElementOf<Tables, S>(sum);
 }
 
 /// M M~ − 1.
 template <class Tables, class S>
 [[nodiscard]] Defect<Tables, S> unit_defect(const ElementOf<Tables, S>& m) noexcept {
-  Defect<Tables, S> defect{detail::product<Tables, S>(m.values, detail::reversed(m.values))};
+  using M = detail::Held<Tables, typename Tables::Element>;
+  Defect<Tables, S> defect{detail::product<Tables, S, M, M>(m.values, detail::reversed(m.values))};
   defect.values[0] -= S(1);
   return defect;
 }
@@ -271,15 +321,21 @@ template <class Tables, class S>
 template <class Tables, class S>
 [[nodiscard]] Defect<Tables, S> unit_defect_change(const ElementOf<Tables, S>& m,
                                                    const ElementOf<Tables, S>& low) noexcept {
-  return Defect<Tables, S>{detail::product<Tables, S>(m.values, detail::reversed(low.values))} +
-         Defect<Tables, S>{detail::product<Tables, S>(low.values, detail::reversed(m.values))};
+  using M = detail::Held<Tables, typename Tables::Element>;
+  return Defect<Tables, S>{
+             detail::product<Tables, S, M, M>(m.values, detail::reversed(low.values))} +
+         Defect<Tables, S>{
+             detail::product<Tables, S, M, M>(low.values, detail::reversed(m.values))};
 }
 
 /// −½ (M M~ − 1) M: what takes M back to the group.
 template <class Tables, class S>
 [[nodiscard]] ElementOf<Tables, S> unit_correction(const ElementOf<Tables, S>& m,
                                                    const Defect<Tables, S>& defect) noexcept {
-  return S(-0.5) * ElementOf<Tables, S>(detail::product<Tables, S>(defect.values, m.values));
+  using M = detail::Held<Tables, typename Tables::Element>;
+  using Square = detail::ProductOf<Tables, M, M>;
+  return S(-0.5) *
+         ElementOf<Tables, S>(detail::product<Tables, S, Square, M>(defect.values, m.values));
 }
 
 }  // namespace hamotor::generic
