@@ -88,7 +88,8 @@ template <class System>
 using Splitting10 = hamotor::Splitting<System, 10>;
 
 using Splittings = List<Splitting2, Splitting4, Splitting6, Splitting8, Splitting10>;
-using Explicit = List<Rkmk4, CommutatorFree4, Rk4, hamotor::Rkmk54, hamotor::Rkmk87>;
+using Explicit = List<Rkmk4, CommutatorFree4, Rk4, hamotor::Rkmk54, hamotor::Rkmk87, hamotor::Rk54,
+                      hamotor::Rk87>;
 using Implicit =
     List<hamotor::LieMidpoint, hamotor::Gauss4, hamotor::Gauss6, hamotor::Gauss8, hamotor::Gauss12>;
 

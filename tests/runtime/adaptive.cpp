@@ -16,6 +16,8 @@
 namespace {
 
 using hamotor::Adaptive;
+using hamotor::Rk54;
+using hamotor::Rk87;
 using hamotor::Rkmk54;
 using hamotor::Rkmk87;
 using hamotor::StateOf;
@@ -64,6 +66,8 @@ TEST(ExplicitMethods, have_their_orders) {
   expect_order<Rkmk87>(sample::forced_se3<Wide>(), 48);
   expect_order<Rkmk87>(sample::forced_so3<Wide>(), 16);
   expect_order<Rkmk87>(sample::forced_se2<Wide>(), 16);
+  expect_order<Rk54>(sample::forced_so3<Wide>(), 80);
+  expect_order<Rk87>(sample::forced_so3<Wide>(), 16);
 }
 
 /// A rooted tree by its subtrees, an index into `trees` each; γ is Butcher's density.
@@ -171,10 +175,12 @@ void expect_order_within_a_step(const System& system, Wide h) {
   }
 }
 
-TEST(Rkmk, is_interpolated_to_its_dense_order) {
+TEST(ExplicitPair, is_interpolated_to_its_dense_order) {
   expect_order_within_a_step<Rkmk54>(sample::forced_se3<Wide>(), 0.002L);
   expect_order_within_a_step<Rkmk87>(sample::forced_se3<Wide>(), 0.04L);
   expect_order_within_a_step<Rkmk87>(sample::two_bodies_se3<Wide>(), 0.04L);
+  expect_order_within_a_step<Rk54>(sample::forced_so3<Wide>(), 0.01L);
+  expect_order_within_a_step<Rk87>(sample::forced_so3<Wide>(), 0.04L);
 }
 
 TEST(Rkmk54, estimates_an_error_of_fifth_order_in_the_step) {
@@ -282,6 +288,7 @@ TEST(Adaptive, takes_no_step_more_for_states_at_more_times) {
   using System = Of<decltype(system)>;
   expect_output_for_nothing<Adaptive<System>>(system);
   expect_output_for_nothing<Adaptive<System, Rkmk87<System>>>(system);
+  expect_output_for_nothing<Adaptive<System, Rk87<System>>>(system);
 }
 
 TEST(Adaptive, is_the_same_after_looks_into_its_next_step) {

@@ -67,6 +67,8 @@ METHODS = (
     Method("rkmk87", 8, "the same by Prince & Dormand's pair", ANY, error_controlled=True),
     Method("cf4", 4, "commutator-free, explicit: two exponentials in place of brackets", ANY),
     Method("rk4", 4, "classical Runge-Kutta, cheaper; less exact for spin", ANY | Form.MATRIX),
+    Method("rk54", 5, "as rk4 by Dormand & Prince's pair", ANY, error_controlled=True),
+    Method("rk87", 8, "the same by Prince & Dormand's pair", ANY, error_controlled=True),
     Method("splitting2", 2, "Strang splitting, symplectic, keeps orbits", SPLITTABLE, ALL),
     Method("splitting4", 4, "the same in 5 to 7 parts a step", SPLITTABLE, ALL),
     Method("splitting6", 6, "the same in 9 to 15 parts a step", SPLITTABLE, ALL),

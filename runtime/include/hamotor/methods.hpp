@@ -19,15 +19,19 @@ namespace detail {
 // Of steppers whose sums over steps are plain or compensated as asked; nothing asked, as is each
 // one's own way.
 
+template <class System, class Pair, class Coordinates, Summation... asked>
+using AdaptivePair = Adaptive<System, ExplicitPair<System, Pair, Coordinates, asked...>>;
+
 template <class System, Summation... asked>
 struct Steppers {
-  using type =
-      std::tuple<Rkmk4<System, asked...>, Adaptive<System, Rkmk<System, DormandPrince54, asked...>>,
-                 Adaptive<System, Rkmk<System, PrinceDormand87, asked...>>,
-                 CommutatorFree4<System, asked...>, Rk4<System, asked...>,
-                 Gauss<System, 1, asked...>, Gauss<System, 2, asked...>, Gauss<System, 3, asked...>,
-                 Gauss<System, 4, asked...>, Gauss<System, 6, asked...>,
-                 Gauss<System, 8, asked...>>;
+  using type = std::tuple<
+      Rkmk4<System, asked...>, AdaptivePair<System, DormandPrince54, ExponentialChart, asked...>,
+      AdaptivePair<System, PrinceDormand87, ExponentialChart, asked...>,
+      CommutatorFree4<System, asked...>, Rk4<System, asked...>,
+      AdaptivePair<System, DormandPrince54, Components, asked...>,
+      AdaptivePair<System, PrinceDormand87, Components, asked...>, Gauss<System, 1, asked...>,
+      Gauss<System, 2, asked...>, Gauss<System, 3, asked...>, Gauss<System, 4, asked...>,
+      Gauss<System, 6, asked...>, Gauss<System, 8, asked...>>;
 };
 
 template <class System, Summation... asked>

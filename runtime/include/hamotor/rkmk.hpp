@@ -1,8 +1,9 @@
-// Explicit Lie-group Runge–Kutta methods: for dissipative and non-smooth forques, and wherever an
-// error estimate is worth more than a structure.
+// Explicit Runge–Kutta methods by embedded pairs and on the group: for dissipative and non-smooth
+// forques, and wherever an error estimate is worth more than a structure.
 #pragma once
 
 #include <array>
+#include <concepts>
 #include <cstddef>
 #include <string_view>
 #include <type_traits>
@@ -59,23 +60,87 @@ template <class System>
   return slope;
 }
 
+/// A motor within a step as M₀ exp X, by X.
+struct ExponentialChart {
+  template <class G, class S>
+  using Change = typename G::template Rate<S>;
+  template <class Pair>
+  static constexpr std::string_view name = Pair::name;
+
+  template <class Motor, class Rate>
+  [[nodiscard]] static constexpr Motor moved(const Motor& start, const Rate& x) noexcept {
+    return gp(start, exp(x));
+  }
+
+  /// Ẋ of Ṁ = M B at X = 0.
+  template <class Motor, class Rate>
+  [[nodiscard]] static constexpr Rate first_slope(const Motor& /*start*/, const Rate& b) noexcept {
+    return b;
+  }
+
+  /// Ẋ of Ṁ = M B, to the order of a method.
+  template <int order, class Motor, class Rate>
+  [[nodiscard]] static constexpr Rate slope(const Motor& /*there*/, const Rate& x,
+                                            const Rate& b) noexcept {
+    return dexp_inverse_series<order>(x, b);
+  }
+
+  /// An error of X as one of M.
+  template <class Motor, class Rate>
+  [[nodiscard]] static constexpr Motor error(const Motor& m, const Rate& x) noexcept {
+    return typename Motor::Scalar(0.5) * kinematics(m, x);
+  }
+};
+
+/// A motor within a step by its components, which a step's end puts back on the group.
+struct Components {
+  template <class G, class S>
+  using Change = typename G::template Element<S>;
+  template <class Pair>
+  static constexpr std::string_view name = Pair::name_on_components;
+
+  template <class Motor>
+  [[nodiscard]] static constexpr Motor moved(const Motor& start, const Motor& by) noexcept {
+    return start + by;
+  }
+
+  template <class Motor, class Rate>
+  [[nodiscard]] static constexpr Motor first_slope(const Motor& start, const Rate& b) noexcept {
+    return kinematics(start, b);
+  }
+
+  template <int /*order*/, class Motor, class Rate>
+  [[nodiscard]] static constexpr Motor slope(const Motor& there, const Motor& /*by*/,
+                                             const Rate& b) noexcept {
+    return kinematics(there, b);
+  }
+
+  template <class Motor>
+  [[nodiscard]] static constexpr Motor error(const Motor& /*m*/, const Motor& by) noexcept {
+    return by;
+  }
+};
+
 }  // namespace detail
 
-/// Runge–Kutta–Munthe-Kaas by an embedded pair: an explicit method for X in M = M₀ exp X and for μ,
-/// and the error of the lower order (Munthe-Kaas 1999).  Not symplectic.
-template <HamiltonianSystem System, class Pair, Summation summation = Summation::compensated>
-class Rkmk : public detail::ExplicitMethod<System, summation> {
+/// An explicit Runge–Kutta method by an embedded pair, for motors in some coordinates of a step and
+/// for μ, and the error of the lower order.  Not symplectic.
+template <HamiltonianSystem System, class Pair, class Coordinates,
+          Summation summation = Summation::compensated>
+class ExplicitPair : public detail::ExplicitMethod<System, summation> {
   using Base = detail::ExplicitMethod<System, summation>;
   using Base::n;
-  using typename Base::Rates;
+  using typename Base::G;
+  using typename Base::Momenta;
   using typename Base::S;
+  using Change = typename Coordinates::template Change<G, S>;
   static constexpr std::size_t stages = Pair::stages;
   static constexpr std::size_t all_stages = Pair::dense_stages;
 
  public:
   static constexpr int order = Pair::order;
   static constexpr int lower_order = Pair::lower_order;
-  static constexpr std::string_view name = Pair::name;
+  static constexpr std::string_view name = Coordinates::template name<Pair>;
   /// The local error of `between` is of this order in the step, and one more.
   static constexpr int dense_order = Pair::dense_order;
 
@@ -86,7 +151,11 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
     known_ = 0;
     find_slopes(system, state, t, stages);
     const Sum sum = combined(table.weights);
-    this->turn(state, S(1), sum.forces, sum.power, sum.rates);
+    if constexpr (std::same_as<Coordinates, detail::Components>) {
+      this->shift(state, S(1), sum.motors, sum.forces, sum.power);
+    } else {
+      this->turn(state, S(1), sum.forces, sum.power, sum.motors);
+    }
     error_ = error_of(state, combined(table.error));
   }
 
@@ -111,7 +180,12 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
   [[nodiscard]] constexpr const S& error() const noexcept { return error_; }
 
  private:
-  using Sum = detail::Slope<System>;
+  /// What a step changes, or how fast: motors in their coordinates, momenta and work.
+  struct Sum {
+    std::array<Change, n> motors;
+    Momenta forces;
+    S power{};
+  };
 
   /// The pair's numbers, rounded to S once.
   struct Table {
@@ -138,18 +212,26 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
     for (std::size_t s = known_; s < count; ++s) {
       Sum& slope = slopes_[s];
       if (s == 0) {
-        slope = detail::slope_of(system, start, t);
+        const auto now = detail::slope_of(system, start, t);
+        slope.forces = now.forces;
+        slope.power = now.power;
+        for (std::size_t i = 0; i < n; ++i) {
+          slope.motors[i] = Coordinates::first_slope(start.motors[i], now.rates[i]);
+        }
         continue;
       }
       const Sum sum = combined(table.rows[s], s);
       StateOf<System> there = start;
       for (std::size_t i = 0; i < n; ++i) {
         there.momenta[i] = start.momenta[i] + sum.forces[i];
-        there.motors[i] = gp(start.motors[i], exp(sum.rates[i]));
+        there.motors[i] = Coordinates::moved(start.motors[i], sum.motors[i]);
       }
-      slope = detail::slope_of(system, there, mul_add(table.nodes[s], h_, t));
+      const auto now = detail::slope_of(system, there, mul_add(table.nodes[s], h_, t));
+      slope.forces = now.forces;
+      slope.power = now.power;
       for (std::size_t i = 0; i < n; ++i) {
-        slope.rates[i] = detail::dexp_inverse_series<order>(sum.rates[i], slope.rates[i]);
+        slope.motors[i] =
+            Coordinates::template slope<order>(there.motors[i], sum.motors[i], now.rates[i]);
       }
     }
     if (known_ < count) known_ = count;
@@ -164,7 +246,7 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
       if (c[r] == S(0)) continue;
       const S by = h_ * c[r];
       for (std::size_t i = 0; i < n; ++i) {
-        sum.rates[i] = mul_add(by, slopes_[r].rates[i], sum.rates[i]);
+        sum.motors[i] = mul_add(by, slopes_[r].motors[i], sum.motors[i]);
         sum.forces[i] = mul_add(by, slopes_[r].forces[i], sum.forces[i]);
       }
       if constexpr (PoweredSystem<System>) sum.power = mul_add(by, slopes_[r].power, sum.power);
@@ -177,7 +259,7 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
     StateOf<System> there = start;
     for (std::size_t i = 0; i < n; ++i) {
       auto& motor = there.motors[i];
-      motor = gp(motor, exp(by.rates[i]));
+      motor = Coordinates::moved(motor, by.motors[i]);
       motor = motor + unit_correction(motor, unit_defect(motor));
       there.momenta[i] = there.momenta[i] + by.forces[i];
     }
@@ -187,7 +269,7 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
   [[nodiscard]] static constexpr S error_of(const StateOf<System>& state, const Sum& by) noexcept {
     S worst(0);
     for (std::size_t i = 0; i < n; ++i) {
-      const S off = detail::largest(S(0.5) * kinematics(state.motors[i], by.rates[i]));
+      const S off = detail::largest(Coordinates::error(state.motors[i], by.motors[i]));
       const S momentum = detail::largest(state.momenta[i]);
       const S push = detail::largest(by.forces[i]);
       worst = scalar::max_abs(worst, off, select(momentum > push, push / momentum, push));
@@ -201,6 +283,14 @@ class Rkmk : public detail::ExplicitMethod<System, summation> {
   S error_ = S(0);
 };
 
+/// Runge–Kutta–Munthe-Kaas: the pair for X in M = M₀ exp X and for μ (Munthe-Kaas 1999).
+template <HamiltonianSystem System, class Pair, Summation summation = Summation::compensated>
+using Rkmk = ExplicitPair<System, Pair, detail::ExponentialChart, summation>;
+/// The pair for the components of M and μ, put back on the group after every step: rates and
+/// forques of a stage are those of a motor that is not quite unit, as in `Rk4`.
+template <HamiltonianSystem System, class Pair, Summation summation = Summation::compensated>
+using Rk = ExplicitPair<System, Pair, detail::Components, summation>;
+
 /// Order 5 with an error of order 4: seven evaluations a step, within which it is of order 4.
 template <HamiltonianSystem System>
 using Rkmk54 = Rkmk<System, DormandPrince54>;
@@ -208,6 +298,12 @@ using Rkmk54 = Rkmk<System, DormandPrince54>;
 /// five more.
 template <HamiltonianSystem System>
 using Rkmk87 = Rkmk<System, PrinceDormand87>;
+/// As `Rkmk54`, without exponentials and brackets.
+template <HamiltonianSystem System>
+using Rk54 = Rk<System, DormandPrince54>;
+/// As `Rkmk87`, without exponentials and brackets.
+template <HamiltonianSystem System>
+using Rk87 = Rk<System, PrinceDormand87>;
 
 /// Commutator-free method of order 4: products of exponentials in place of brackets, two for the
 /// last half of a step (Celledoni, Marthinsen & Owren 2003).  Four evaluations a step; not

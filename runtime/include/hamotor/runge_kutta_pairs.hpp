@@ -55,6 +55,7 @@ template <class S, class Text, std::size_t count>
 /// 1993, II.6).  The last stage is taken at the end of the step.
 struct DormandPrince54 {
   static constexpr std::string_view name = "rkmk54";
+  static constexpr std::string_view name_on_components = "rk54";
   static constexpr int order = 5;
   /// Order of the embedded method.
   static constexpr int lower_order = 4;
@@ -106,6 +107,7 @@ struct DormandPrince54 {
 /// found.
 struct PrinceDormand87 {
   static constexpr std::string_view name = "rkmk87";
+  static constexpr std::string_view name_on_components = "rk87";
   static constexpr int order = 8;
   /// Order of the embedded method.
   static constexpr int lower_order = 7;
