@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 from tests.reference import conditioned
+from tests.reference.program import processor_can_fuse
 from tests.reference.ulp import (
     BOUND,
     SCALARS,
     TABLE,
     Measurement,
     measurements,
-    processor_can_fuse,
     worst_disagreement,
 )
 

@@ -19,7 +19,7 @@ from typing import Any
 
 import mpmath
 from tests.reference.oracle import Oracle, added, scaled
-from tests.reference.program import program
+from tests.reference.program import processor_can_fuse, program
 
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.spec import bundled_path, read_algebra
@@ -62,7 +62,7 @@ class Measurement:
 
 
 def _lines(mode: str, points: int, groups: Sequence[str]) -> list[dict[str, Any]]:
-    command = [str(program(SOURCE)), mode, str(points), *groups]
+    command = [str(program(SOURCE, fused=processor_can_fuse())), mode, str(points), *groups]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     return [json.loads(line.replace(": inf", ": Infinity")) for line in run.stdout.splitlines()]
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import mpmath
-from tests.reference.program import program
+from tests.reference.program import processor_can_fuse, program
 
 SOURCE = Path(__file__).with_name("packs.cpp")
 TABLE = Path(__file__).with_name("packs.md")
@@ -71,7 +71,7 @@ class Measurement:
 
 
 def _lines(mode: str, points: int) -> list[dict[str, Any]]:
-    command = [str(program(SOURCE)), mode, str(points)]
+    command = [str(program(SOURCE, fused=processor_can_fuse())), mode, str(points)]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     return [json.loads(line.replace(": inf", ": Infinity")) for line in run.stdout.splitlines()]
 

@@ -4,28 +4,35 @@ from __future__ import annotations
 
 import hashlib
 import os
+import platform
 import subprocess
 from pathlib import Path
-
-from tests.reference.ulp import processor_can_fuse
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILDS = ROOT / ".hamotor" / "build"
 
 
-def program(source: Path) -> Path:
-    """The compiled program, with fused multiply-adds where the processor has them."""
-    fused = ["-mfma"] if processor_can_fuse() and os.uname().machine == "x86_64" else []
-    flags = ["-std=gnu++20", "-O2", "-ffp-contract=off", *fused]
+def processor_can_fuse() -> bool:
+    """Whether programs built with hardware fused multiply-adds run here."""
+    if platform.machine() != "x86_64":
+        return True
+    return " fma " in Path("/proc/cpuinfo").read_text(encoding="utf-8")
+
+
+def program(source: Path, *, fused: bool) -> Path:
+    """The compiled program; `fused`: with hardware fused multiply-adds."""
+    native = ["-mfma"] if fused and platform.machine() == "x86_64" else []
+    flags = ["-std=gnu++20", "-O2", "-ffp-contract=off", *native]
     identity = hashlib.sha256(" ".join(flags).encode())
     headers = [p for f in ("generated", "runtime/include") for p in (ROOT / f).rglob("*.hpp")]
     for path in (source, *sorted(headers)):
         identity.update(path.read_bytes())
     folder = BUILDS / source.stem
-    target = folder / f"{source.stem}-{identity.hexdigest()[:16]}"
+    stem = f"{source.stem}-{'fma' if fused else 'plain'}"
+    target = folder / f"{stem}-{identity.hexdigest()[:16]}"
     if not target.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        for older in folder.glob(f"{source.stem}-{'?' * 16}"):
+        for older in folder.glob(f"{stem}-{'?' * 16}"):
             older.unlink(missing_ok=True)
         unfinished = folder / f"{os.getpid()}-{target.name}"
         folders = [f"-I{ROOT / folder}" for folder in ("generated", "runtime/include")]

@@ -11,10 +11,8 @@ from the oracle, 100 digits.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import platform
 import subprocess
 import sys
 from collections.abc import Callable, Sequence
@@ -27,9 +25,8 @@ from typing import Any
 import mpmath
 from tests.reference import conditioned
 from tests.reference.oracle import Blade, Oracle, added, scaled
+from tests.reference.program import processor_can_fuse, program
 
-ROOT = Path(__file__).resolve().parents[2]
-BUILDS = ROOT / ".hamotor" / "build" / "ulp"
 SOURCE = Path(__file__).with_name("ulp.cpp")
 TABLE = Path(__file__).with_name("ulp.md")
 SCALARS = ("double", "float")
@@ -75,33 +72,8 @@ class Measurement:
         return self.max_ulp <= BOUND and self.nan == 0 and self.beyond <= 1
 
 
-def program(fused: bool) -> Path:
-    """The compiled ulp.cpp; built once for the same text, headers and flags."""
-    native = ["-mfma"] if fused and platform.machine() == "x86_64" else []
-    flags = ["-std=gnu++20", "-O2", "-ffp-contract=off", *native]
-    headers = sorted(
-        path
-        for folder in ("generated", "runtime/include")
-        for path in (ROOT / folder).rglob("*.hpp")
-    )
-    identity = hashlib.sha256(" ".join(flags).encode())
-    for path in (SOURCE, *headers):
-        identity.update(path.read_bytes())
-    target = BUILDS / f"ulp-{'fma' if fused else 'plain'}-{identity.hexdigest()[:16]}"
-    if not target.exists():
-        BUILDS.mkdir(parents=True, exist_ok=True)
-        for older in BUILDS.glob(f"{target.name[:-16]}{'?' * 16}"):
-            older.unlink(missing_ok=True)
-        unfinished = BUILDS / f"{os.getpid()}-{target.name}"
-        folders = [f"-I{ROOT / folder}" for folder in ("generated", "runtime/include")]
-        command = ["g++", *flags, *folders, str(SOURCE), "-o", str(unfinished), "-lquadmath"]
-        subprocess.run(command, check=True)
-        unfinished.replace(target)
-    return target
-
-
 def _lines(fused: bool, mode: str, scalar: str, points: int) -> list[dict[str, Any]]:
-    command = [str(program(fused)), mode, scalar, str(points)]
+    command = [str(program(SOURCE, fused=fused)), mode, scalar, str(points)]
     run = subprocess.run(command, check=True, capture_output=True, text=True)
     text = run.stdout.replace(": inf", ": Infinity").replace(": -nan", ": NaN")
     return [json.loads(line.replace(": nan", ": NaN")) for line in text.splitlines()]
@@ -111,7 +83,7 @@ def measurements(
     points: int, *, fused: bool, scalars: Sequence[str] = SCALARS
 ) -> list[Measurement]:
     """Errors at `points` points of each function in each form and scalar."""
-    program(fused)
+    program(SOURCE, fused=fused)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         found = pool.map(lambda scalar: _lines(fused, "measure", scalar, points), scalars)
         return [
@@ -128,13 +100,6 @@ def measurements(
             for lines in found
             for line in lines
         ]
-
-
-def processor_can_fuse() -> bool:
-    """Whether programs built with hardware fused multiply-adds run here."""
-    if platform.machine() != "x86_64":
-        return True
-    return " fma " in Path("/proc/cpuinfo").read_text(encoding="utf-8")
 
 
 # ---------------------------------------------------------------- the reference's reference
