@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import subprocess
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -148,6 +149,15 @@ def test_the_version_is_asked_again_only_when_the_compiler_changed(
     script.write_text(script.read_text() + "# changed\n")
     find_compiler(tmp_path)
     assert len(asked) == 2
+
+
+def test_threads_that_ask_for_a_compiler_at_once_do_not_disturb_each_other(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        for attempt in range(5):
+            cache = tmp_path / str(attempt)
+            found = list(pool.map(lambda _, cache=cache: find_compiler(cache), range(8)))
+            assert len({compiler.version for compiler in found}) == 1
+            assert [file.name for file in cache.iterdir()] == ["compilers.json"]
 
 
 def test_a_damaged_memory_of_versions_is_forgotten(tmp_path: Path) -> None:

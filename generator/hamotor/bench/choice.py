@@ -28,7 +28,7 @@ from hamotor.scene.methods import ALL
 from hamotor.scene.structure import STRUCTURES, structure_of
 
 _KEPT = 4
-_EXTENT = Extent(3, 2.0, 0.05, 0.05, False, COMPILERS[:1])
+_EXTENT = Extent(3, 2.0, 0.2, 0.05, False, COMPILERS[:1])
 _SPLIT = ("free", "planar", "several", "symmetric", "asymmetric", "parts")
 _ORDER_WITHOUT_SPLIT = 4
 """Where a step has to be iterated, order 4 costs hardly more than order 2."""

@@ -16,6 +16,7 @@ import shlex
 import shutil
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -413,7 +414,7 @@ def _run_compiler(
     source: Path,
     library: Path,
 ) -> None:
-    unfinished = library.with_name(f".scene-{os.getpid()}.so")
+    unfinished = library.with_name(f".scene-{threading.get_native_id()}.so")
     command = [*compiler.command, *flags]
     for folder in includes:
         command += ["-I", str(folder)]
@@ -446,6 +447,6 @@ def _first_errors(output: str) -> str:
 
 def _write_whole(path: Path, content: bytes) -> None:
     """Write so that a reader sees the whole file or none of it."""
-    unfinished = path.with_name(f".{path.name}-{os.getpid()}")
+    unfinished = path.with_name(f".{path.name}-{threading.get_native_id()}")
     unfinished.write_bytes(content)
     unfinished.replace(path)
