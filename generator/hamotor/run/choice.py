@@ -21,9 +21,7 @@ _PRESERVING = {
     ),
 }
 _FALLBACKS = ("splitting2", "rkmk4")
-_LIKE = {"several": "asymmetric", "parts": "general", "forced": "general"}
-"""What a structure without measurements of its own is likened to, where a tolerance is given."""
-_ROUGH = "rkmk54", "it chooses its steps, so that it can shorten them at corners; not measured"
+_ROUGH = "rk54", "it chooses its steps, so that it can shorten them at corners; not measured"
 
 
 @cache
@@ -51,10 +49,8 @@ def choose_method(
         found = _preserving(structures[structure], methods)
     elif tolerance is not None and structure == "rough" and _ROUGH[0] in methods:
         found = _ROUGH
-    elif tolerance is not None:
-        for known in (structure, _LIKE.get(structure)):
-            if found is None and known in structures:
-                found = _cheapest(structures[known], methods, tolerance)
+    elif tolerance is not None and structure in structures:
+        found = _cheapest(structures[structure], methods, tolerance)
     if found is not None:
         return found
     for name in _FALLBACKS:
