@@ -16,8 +16,8 @@ from hamotor.scene import bundled_scenes
 OFTEN = {"heavy_top", "spring_pendulum", "breathing_body", "rocket", "two_bodies"}
 OFTEN |= {"SE3", "Sim3", "SE4", "SO13", "SE2"}
 """Compiled for every change; the others only when asked for."""
-LINEAR = {"SE3", "Sim3"}
-"""Stepped without an exponential, too."""
+OTHERS = {"SE3": ["rk4"], "Sim3": ["splitting4"]}
+"""Methods of other kinds: without an exponential, and by parts of the kinetic energy."""
 BUNDLED = [
     pytest.param(name, marks=() if name in OFTEN else pytest.mark.long)
     for name, _ in bundled_scenes()
@@ -86,8 +86,7 @@ def test_every_group_moves_alike(algebra: str, group: str, tmp_path: Path) -> No
         f'[hamiltonian]\nexpression = "{energy} + {coupled} + motor(it).s^2/3"\n'
         "[time]\nend = 1\nstep = 0.01\n"
     )
-    methods = ["rkmk4", "rk4"] if group in LINEAR else ["rkmk4"]
-    agree_in(hamotor.load(path), "long_double", *methods)
+    agree_in(hamotor.load(path), "long_double", "rkmk4", *OTHERS.get(group, []))
 
 
 @pytest.mark.parametrize("name", ["spring_pendulum", "breathing_body"])
@@ -108,9 +107,9 @@ def test_a_run_says_which_kernels_it_had() -> None:
     assert simulation.method == "splitting2"
     run = simulation.run(end=0.05, kernels="generic")
     assert run.report["kernels"] == "generic"
-    assert run.report["method"] == "rkmk4"
+    assert run.report["method"] == "splitting2"
     assert "generic kernels" in run.summary()
-    with pytest.raises(hamotor.UsageError, match=r'"splitting2".*rkmk4'):
-        simulation.run(end=0.05, method="splitting2", kernels="generic")
+    with pytest.raises(hamotor.UsageError, match=r'"moser_veselov2".*rkmk4'):
+        simulation.run(end=0.05, method="moser_veselov2", kernels="generic")
     with pytest.raises(hamotor.UsageError, match="matrix form has no kernels"):
         simulation.run(end=0.05, kernels="generic", representation="matrix")

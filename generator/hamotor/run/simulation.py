@@ -63,6 +63,8 @@ class Simulation:
     read: Callable[[], Scene | GeneralScene] | None = None
     matrix_source: Callable[[str], str] | None = None
     """Gives the C++ text in the matrix representation, for a scalar."""
+    methods_by_table: Callable[[], Mapping[str, int]] | None = None
+    """Gives names and orders of the methods with products by table."""
     has_events: bool = False
     structure: str = ""
     """Its class of `hamotor.scene.structure`, for the choice of a method."""
@@ -160,7 +162,9 @@ class Simulation:
 
         if not self.methods or (kernels, representation) == ("generated", "ga"):
             return self.methods
-        return methods_offered(Form.MATRIX if representation == "matrix" else Form.GENERAL)
+        if representation == "matrix":
+            return methods_offered(Form.MATRIX)
+        return self.methods_by_table() if self.methods_by_table else methods_offered(Form.GENERAL)
 
     def run(
         self,
@@ -447,6 +451,10 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
 
         return str(kept.value(f"matrix {scalar}", lambda: matrix_source(read(), scalar)))
 
+    def by_table() -> dict[str, int]:
+        methods = kept.value("methods by table", lambda: methods_offered(_form_in_tables(read())))
+        return dict(methods)
+
     known = kept.value("settings", settings)
     return Simulation(
         **{
@@ -458,6 +466,7 @@ def load(scene: str | os.PathLike[str]) -> Simulation:
         source=source,
         read=read,
         matrix_source=in_matrices,
+        methods_by_table=by_table,
     )
 
 
@@ -468,6 +477,13 @@ def _ensemble(scene: Scene | GeneralScene) -> Ensemble:
     if isinstance(scene, Scene) and scene.draws_parameters:
         return scene.general.ensemble
     return scene.ensemble
+
+
+def _form_in_tables(scene: Scene | GeneralScene) -> Form:
+    """What kinds of methods step it with products by table."""
+    from hamotor.scene import Scene
+
+    return (scene.general if isinstance(scene, Scene) else scene).form
 
 
 def _form_of_members(scene: Scene | GeneralScene) -> Form:
@@ -505,6 +521,7 @@ def from_hamiltonian(energy: Any, bodies: Sequence[BodyWords], **settings: Any) 
         structure=structure_of(scene),
         read=lambda: scene,
         matrix_source=lambda scalar: matrix_source(scene, scalar),
+        methods_by_table=lambda: methods_offered(scene.form),
     )
 
 

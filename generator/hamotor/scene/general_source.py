@@ -94,8 +94,8 @@ def general_source(
         own_system = _lagrangian(scene.lagrangian, group_type, by_name)
     else:
         own_system = _hamiltonian(scene, system)
-        split = not by_name and not (drawn and scene.draws_rates)
-        own_system["parts"] = _parts(scene, system) if split else None
+        split = not (drawn and scene.draws_rates)
+        own_system["parts"] = _parts(scene, system, by_name) if split else None
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
     names = [f"position.{axis}" for axis in "xyzw"[: first.dimension]]
     units = ["m"] * first.dimension
@@ -225,8 +225,8 @@ def _hamiltonian(scene: GeneralScene, system: System) -> dict[str, Any]:
     }
 
 
-def _parts(scene: GeneralScene, system: System) -> dict[str, Any] | None:
-    """The known motions of a kinetic energy, for the template."""
+def _parts(scene: GeneralScene, system: System, by_name: bool) -> dict[str, Any] | None:
+    """The known motions of a kinetic energy, for the template; by_name: by the group's own exp."""
     if scene.parts is None:
         return None
     count = len(scene.bodies)
@@ -238,7 +238,7 @@ def _parts(scene: GeneralScene, system: System) -> dict[str, Any] | None:
         for together in sets:
             names = []
             for part in together:
-                flows.append(_flow(system, k, part, f"flow_{len(flows)}"))
+                flows.append(_flow(system, k, part, f"flow_{len(flows)}", by_name))
                 names.append(flows[-1]["name"])
             *outer, inner = names
             calls += [
@@ -256,9 +256,9 @@ def _parts(scene: GeneralScene, system: System) -> dict[str, Any] | None:
     }
 
 
-def _flow(system: System, k: int, part: Part, name: str) -> dict[str, Any]:
+def _flow(system: System, k: int, part: Part, name: str, by_name: bool) -> dict[str, Any]:
     """One part, for the template."""
-    program = motion(system, k, part)
+    program = None if by_name else motion(system, k, part)
     text = ProgramText(rate_of(system, k, part) if program is None else program)
     outputs = None
     if program is not None:
