@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -22,9 +23,10 @@ DIGITS = 50
 FLOAT: Mapping[str, Callable[..., Any]] = {
     "number": lambda x: np.float64(float(x)),
     "sqrt": np.sqrt,
+    "fma": lambda a, b, c: np.float64(float(Fraction(a) * Fraction(b) + Fraction(c))),
     "sin": np.sin,
     "cos": np.cos,
-    "atan2": np.arctan2,
+    "acos": np.arccos,
 }
 """The scalar functions in doubles."""
 

@@ -139,6 +139,8 @@ COSTS = {
     "pga3 so3::ad Rate Rate": (6, 3),
     "pga2 gp Motor Motor": (12, 8),
     "pga2 commutator Bivector Bivector": (4, 2),
+    "pga3 se3::kinematics Motor Rate": (42, 28),
+    "pga3 so3::kinematics Rotor Rate": (15, 8),
 }
 """Multiplications and additions at most: the lowest published, where there are such."""
 

@@ -79,36 +79,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so31::Rate<S> Ad(const Versor<S>& m,
                                                         const so31::Rate<S>& w) noexcept {
-  const S c_e01 = dot(-m.e12, w.u2, m.e0i, w.u1, m.e01, w.d, m.e02, w.w12);
-  const S c_e02 = dot(m.e12, w.u1, m.e0i, w.u2, -m.e01, w.w12, m.e02, w.d);
-  const S c_e12 = dot(m.e1i, w.u2, -m.e2i, w.u1, m.e01, w.v2, -m.e02, w.v1);
-  const S c_e0i = dot(m.e1i, w.u1, m.e2i, w.u2, -m.e01, w.v1, -m.e02, w.v2);
-  const S c_e1i = dot(-m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12);
-  const S c_e2i = dot(m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d);
-  return {.w12 = mul_add(S(2),
-                         dot(-c_e12, m.s, -c_e0i, m.e012i, -c_e01, m.e2i, c_e02, m.e1i, -c_e1i,
-                             m.e02, c_e2i, m.e01),
-                         w.w12),
-          .v1 = mul_add(S(2),
-                        dot(-c_e1i, m.s, -c_e1i, m.e0i, -c_e2i, m.e12, -c_e2i, m.e012i, c_e12,
-                            m.e2i, c_e0i, m.e1i),
-                        w.v1),
-          .v2 = mul_add(S(2),
-                        dot(c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
-                            c_e0i, m.e2i),
-                        w.v2),
-          .d = mul_add(S(2),
-                       dot(-c_e12, m.e012i, c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, c_e1i, m.e01,
-                           c_e2i, m.e02),
-                       w.d),
-          .u1 = mul_add(S(2),
-                        dot(-c_e01, m.s, c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i, c_e12, m.e02,
-                            -c_e0i, m.e01),
-                        w.u1),
-          .u2 = mul_add(S(2),
-                        dot(c_e01, m.e12, -c_e01, m.e012i, -c_e02, m.s, c_e02, m.e0i, -c_e12, m.e01,
-                            -c_e0i, m.e02),
-                        w.u2)};
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e0i = S(2) * m.e0i;
+  const S twice_e01 = S(2) * m.e01;
+  const S twice_e02 = S(2) * m.e02;
+  const S c_e01 = dot(-twice_e12, w.u2, twice_e0i, w.u1, twice_e01, w.d, twice_e02, w.w12);
+  const S c_e02 = dot(twice_e12, w.u1, twice_e0i, w.u2, -twice_e01, w.w12, twice_e02, w.d);
+  const S c_e12 = dot(twice_e1i, w.u2, -twice_e2i, w.u1, twice_e01, w.v2, -twice_e02, w.v1);
+  const S c_e0i = dot(twice_e1i, w.u1, twice_e2i, w.u2, -twice_e01, w.v1, -twice_e02, w.v2);
+  const S c_e1i = dot(-twice_e12, w.v2, -twice_e0i, w.v1, -twice_e1i, w.d, twice_e2i, w.w12);
+  const S c_e2i = dot(twice_e12, w.v1, -twice_e0i, w.v2, -twice_e1i, w.w12, -twice_e2i, w.d);
+  return {.w12 = dot(w.w12, -c_e12, m.s, -c_e0i, m.e012i, -c_e01, m.e2i, c_e02, m.e1i, -c_e1i,
+                     m.e02, c_e2i, m.e01),
+          .v1 = dot(w.v1, -c_e1i, m.s, -c_e1i, m.e0i, -c_e2i, m.e12, -c_e2i, m.e012i, c_e12, m.e2i,
+                    c_e0i, m.e1i),
+          .v2 = dot(w.v2, c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
+                    c_e0i, m.e2i),
+          .d = dot(w.d, -c_e12, m.e012i, c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, c_e1i, m.e01,
+                   c_e2i, m.e02),
+          .u1 = dot(w.u1, -c_e01, m.s, c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i, c_e12, m.e02,
+                    -c_e0i, m.e01),
+          .u2 = dot(w.u2, c_e01, m.e12, -c_e01, m.e012i, -c_e02, m.s, c_e02, m.e0i, -c_e12, m.e01,
+                    -c_e0i, m.e02)};
 }
 
 /// Ad_star_inverse: Versor Momentum -> Momentum
@@ -118,37 +112,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so31::Momentum<S> Ad_star_inverse(
     const Versor<S>& m, const so31::Momentum<S>& mu) noexcept {
-  const S c_e01 = dot(m.e12, mu.p1, m.e0i, mu.p2, -m.e01, mu.l12, -m.e02, mu.q);
-  const S c_e02 = dot(m.e12, mu.p2, -m.e0i, mu.p1, m.e01, mu.q, -m.e02, mu.l12);
-  const S c_e12 = dot(-m.e1i, mu.p1, -m.e2i, mu.p2, m.e01, mu.k1, m.e02, mu.k2);
-  const S c_e0i = dot(m.e1i, mu.p2, -m.e2i, mu.p1, m.e01, mu.k2, -m.e02, mu.k1);
-  const S c_e1i = dot(-m.e12, mu.k1, m.e0i, mu.k2, m.e1i, mu.l12, -m.e2i, mu.q);
-  const S c_e2i = dot(-m.e12, mu.k2, -m.e0i, mu.k1, m.e1i, mu.q, m.e2i, mu.l12);
-  return {
-      .l12 = mul_add(S(2),
-                     dot(c_e12, m.e012i, -c_e0i, m.s, c_e01, m.e1i, c_e02, m.e2i, -c_e1i, m.e01,
-                         -c_e2i, m.e02),
-                     mu.l12),
-      .p1 = mul_add(
-          S(2),
-          dot(-c_e01, m.e12, c_e01, m.e012i, c_e02, m.s, -c_e02, m.e0i, c_e12, m.e01, c_e0i, m.e02),
-          mu.p1),
-      .p2 = mul_add(S(2),
-                    dot(-c_e01, m.s, c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i, c_e12, m.e02,
-                        -c_e0i, m.e01),
-                    mu.p2),
-      .q = mul_add(
-          S(2),
-          dot(c_e12, m.s, c_e0i, m.e012i, c_e01, m.e2i, -c_e02, m.e1i, c_e1i, m.e02, -c_e2i, m.e01),
-          mu.q),
-      .k1 = mul_add(S(2),
-                    dot(c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
-                        c_e0i, m.e2i),
-                    mu.k1),
-      .k2 = mul_add(
-          S(2),
-          dot(c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e12, m.e2i, -c_e0i, m.e1i),
-          mu.k2)};
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e0i = S(2) * m.e0i;
+  const S twice_e01 = S(2) * m.e01;
+  const S twice_e02 = S(2) * m.e02;
+  const S c_e01 = dot(mu.p1, twice_e12, mu.p2, twice_e0i, -mu.l12, twice_e01, -mu.q, twice_e02);
+  const S c_e02 = dot(mu.p2, twice_e12, -mu.p1, twice_e0i, mu.q, twice_e01, -mu.l12, twice_e02);
+  const S c_e12 = dot(-mu.p1, twice_e1i, -mu.p2, twice_e2i, mu.k1, twice_e01, mu.k2, twice_e02);
+  const S c_e0i = dot(mu.p2, twice_e1i, -mu.p1, twice_e2i, mu.k2, twice_e01, -mu.k1, twice_e02);
+  const S c_e1i = dot(-mu.k1, twice_e12, mu.k2, twice_e0i, mu.l12, twice_e1i, -mu.q, twice_e2i);
+  const S c_e2i = dot(-mu.k2, twice_e12, -mu.k1, twice_e0i, mu.q, twice_e1i, mu.l12, twice_e2i);
+  return {.l12 = dot(mu.l12, c_e12, m.e012i, -c_e0i, m.s, c_e01, m.e1i, c_e02, m.e2i, -c_e1i, m.e01,
+                     -c_e2i, m.e02),
+          .p1 = dot(mu.p1, -c_e01, m.e12, c_e01, m.e012i, c_e02, m.s, -c_e02, m.e0i, c_e12, m.e01,
+                    c_e0i, m.e02),
+          .p2 = dot(mu.p2, -c_e01, m.s, c_e01, m.e0i, -c_e02, m.e12, c_e02, m.e012i, c_e12, m.e02,
+                    -c_e0i, m.e01),
+          .q = dot(mu.q, c_e12, m.s, c_e0i, m.e012i, c_e01, m.e2i, -c_e02, m.e1i, c_e1i, m.e02,
+                   -c_e2i, m.e01),
+          .k1 = dot(mu.k1, c_e1i, m.e12, c_e1i, m.e012i, -c_e2i, m.s, -c_e2i, m.e0i, -c_e12, m.e1i,
+                    c_e0i, m.e2i),
+          .k2 = dot(mu.k2, c_e1i, m.s, c_e1i, m.e0i, c_e2i, m.e12, c_e2i, m.e012i, -c_e12, m.e2i,
+                    -c_e0i, m.e1i)};
 }
 
 /// pairing: Momentum Rate -> Scalar
@@ -163,7 +150,7 @@ template <class S>
 /// dexp: Rate Rate -> Rate
 /// Σ (−1)^k/(k+1)! ad_a^k b: the body rate of exp(a) where a changes at rate b.
 /// M = M0 exp(a) has ~M M' = dexp(a, a').
-/// Cost: 81 mul, 65 add (53 fused), 1 dexp_complex.
+/// Cost: 81 mul, 65 add (47 fused), 1 dexp_complex.
 template <class S>
 [[nodiscard]] constexpr so31::Rate<S> dexp(const so31::Rate<S>& a,
                                            const so31::Rate<S>& b) noexcept {

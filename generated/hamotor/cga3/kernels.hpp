@@ -1357,57 +1357,53 @@ template <class S>
 /// sandwich: Motor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 117 mul, 93 add (74 fused).
+/// Cost: 114 mul, 93 add (74 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Motor<S>& m, const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12);
-  const S c_e02 = dot(b.e03, m.e23, -b.e01, m.e12);
-  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i);
-  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31);
-  const S c_e13 = dot(-b.e12, m.e23, b.e23, m.e12, -b.e03, m.e1i, b.e01, m.e3i);
-  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i);
-  const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
-  const S c_e1i = dot(-b.e3i, m.e31, b.e2i, m.e12, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
-  const S c_e2i = dot(b.e3i, m.e23, -b.e1i, m.e12, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
-  const S c_e012i = b.e03 * m.e123i;
-  const S c_e3i = dot(-b.e2i, m.e23, b.e1i, m.e31, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
-  const S c_e013i = b.e02 * m.e123i;
-  const S c_e023i = b.e01 * m.e123i;
-  const S c_e123i = b.e0i * m.e123i;
-  return {.e23 = mul_add(S(2),
-                         dot(-c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i, -c_e12, m.e31, -c_e13,
-                             m.e12, c_e23, m.s),
-                         b.e23),
-          .e31 = mul_add(S(2),
-                         dot(-c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i, c_e12, m.e23, -c_e13,
-                             m.s, -c_e23, m.e12),
-                         b.e31),
-          .e12 = mul_add(S(2),
-                         dot(c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i, c_e12, m.s, c_e13, m.e23,
-                             c_e23, m.e31),
-                         b.e12),
-          .e1i = mul_add(S(2),
-                         dot(-c_e123i, m.e23, c_e012i, m.e2i, -c_e013i, m.e3i, c_e023i, m.e123i,
-                             -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i,
-                             m.e12, -c_e3i, m.e31, c_e0i, m.e1i),
-                         b.e1i),
-          .e2i = mul_add(S(2),
-                         dot(-c_e123i, m.e31, -c_e012i, m.e1i, c_e013i, m.e123i, c_e023i, m.e3i,
-                             c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s,
-                             c_e3i, m.e23, c_e0i, m.e2i),
-                         b.e2i),
-          .e3i = mul_add(S(2),
-                         dot(-c_e123i, m.e12, c_e012i, m.e123i, c_e013i, m.e1i, -c_e023i, m.e2i,
-                             -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i,
-                             m.e23, c_e3i, m.s, c_e0i, m.e3i),
-                         b.e3i),
-          .e0i = mul_add(S(-2),
-                         dot(c_e012i, m.e12, c_e013i, m.e31, c_e023i, m.e23, c_e01, m.e1i, c_e02,
-                             m.e2i, c_e03, m.e3i, c_e0i, m.s),
-                         b.e0i),
-          .e01 = mul_add(S(2), dot(c_e01, m.s, c_e02, m.e12, -c_e03, m.e31), b.e01),
-          .e02 = mul_add(S(2), dot(-c_e01, m.e12, c_e02, m.s, c_e03, m.e23), b.e02),
-          .e03 = mul_add(S(2), dot(c_e01, m.e31, -c_e02, m.e23, c_e03, m.s), b.e03)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e3i = S(2) * m.e3i;
+  const S twice_e123i = S(2) * m.e123i;
+  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
+  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12);
+  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31, -b.e02, twice_e1i, b.e01, twice_e2i);
+  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
+  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12, -b.e03, twice_e1i, b.e01, twice_e3i);
+  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12, -b.e03, twice_e2i, b.e02, twice_e3i);
+  const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
+  const S c_e1i = dot(-b.e3i, twice_e31, b.e2i, twice_e12, -b.e0i, twice_e1i, -b.e12, twice_e2i,
+                      b.e31, twice_e3i);
+  const S c_e2i = dot(b.e3i, twice_e23, -b.e1i, twice_e12, b.e12, twice_e1i, -b.e0i, twice_e2i,
+                      -b.e23, twice_e3i);
+  const S c_e012i = b.e03 * twice_e123i;
+  const S c_e3i = dot(-b.e2i, twice_e23, b.e1i, twice_e31, -b.e31, twice_e1i, b.e23, twice_e2i,
+                      -b.e0i, twice_e3i);
+  const S c_e013i = b.e02 * twice_e123i;
+  const S c_e023i = b.e01 * twice_e123i;
+  const S c_e123i = b.e0i * twice_e123i;
+  return {.e23 = dot(b.e23, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i, -c_e12, m.e31, -c_e13,
+                     m.e12, c_e23, m.s),
+          .e31 = dot(b.e31, -c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i, c_e12, m.e23, -c_e13, m.s,
+                     -c_e23, m.e12),
+          .e12 = dot(b.e12, c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i, c_e12, m.s, c_e13, m.e23,
+                     c_e23, m.e31),
+          .e1i = dot(b.e1i, -c_e123i, m.e23, c_e012i, m.e2i, -c_e013i, m.e3i, c_e023i, m.e123i,
+                     -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12,
+                     -c_e3i, m.e31, c_e0i, m.e1i),
+          .e2i = dot(b.e2i, -c_e123i, m.e31, -c_e012i, m.e1i, c_e013i, m.e123i, c_e023i, m.e3i,
+                     c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s, c_e3i,
+                     m.e23, c_e0i, m.e2i),
+          .e3i = dot(b.e3i, -c_e123i, m.e12, c_e012i, m.e123i, c_e013i, m.e1i, -c_e023i, m.e2i,
+                     -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i, m.e23,
+                     c_e3i, m.s, c_e0i, m.e3i),
+          .e0i = dot(b.e0i, -c_e012i, m.e12, -c_e013i, m.e31, -c_e023i, m.e23, -c_e01, m.e1i,
+                     -c_e02, m.e2i, -c_e03, m.e3i, -c_e0i, m.s),
+          .e01 = dot(b.e01, c_e01, m.s, c_e02, m.e12, -c_e03, m.e31),
+          .e02 = dot(b.e02, -c_e01, m.e12, c_e02, m.s, c_e03, m.e23),
+          .e03 = dot(b.e03, c_e01, m.e31, -c_e02, m.e23, c_e03, m.s)};
 }
 
 /// sandwich: Motor Point -> Point
@@ -1435,14 +1431,18 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Plane<S> sandwich(const Motor<S>& m,
                                                          const Plane<S>& p) noexcept {
-  const S y_e1 = dot(m.s, p.e1, m.e12, p.e2, -m.e31, p.e3);
-  const S y_e2 = dot(-m.e12, p.e1, m.s, p.e2, m.e23, p.e3);
-  const S y_e3 = dot(m.e31, p.e1, -m.e23, p.e2, m.s, p.e3);
-  const S y_e123 = dot(m.e23, p.e1, m.e31, p.e2, m.e12, p.e3);
-  return {.e1 = mul_add(S(2), dot(-m.e31, y_e3, m.e12, y_e2), p.e1),
-          .e2 = mul_add(S(2), dot(m.e23, y_e3, -m.e12, y_e1), p.e2),
-          .e3 = mul_add(S(2), dot(-m.e23, y_e2, m.e31, y_e1), p.e3),
-          .ei = mul_add(S(-2), dot(m.e1i, y_e1, m.e2i, y_e2, m.e3i, y_e3, m.e123i, y_e123), p.ei)};
+  const S twice_s = S(2) * m.s;
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S y_e1 = dot(p.e1, twice_s, p.e2, twice_e12, -p.e3, twice_e31);
+  const S y_e2 = dot(-p.e1, twice_e12, p.e2, twice_s, p.e3, twice_e23);
+  const S y_e3 = dot(p.e1, twice_e31, -p.e2, twice_e23, p.e3, twice_s);
+  const S y_e123 = dot(p.e1, twice_e23, p.e2, twice_e31, p.e3, twice_e12);
+  return {.e1 = dot(p.e1, -m.e31, y_e3, m.e12, y_e2),
+          .e2 = dot(p.e2, m.e23, y_e3, -m.e12, y_e1),
+          .e3 = dot(p.e3, -m.e23, y_e2, m.e31, y_e1),
+          .ei = dot(p.ei, -m.e1i, y_e1, -m.e2i, y_e2, -m.e3i, y_e3, -m.e123i, y_e123)};
 }
 
 /// sandwich: Motor Line -> Line
@@ -1452,27 +1452,27 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Line<S> sandwich(const Motor<S>& m,
                                                         const Line<S>& l) noexcept {
-  const S c_e12 = dot(-l.e31, m.e23, l.e23, m.e31);
-  const S c_e13 = dot(-l.e12, m.e23, l.e23, m.e12);
-  const S c_e23 = dot(-l.e12, m.e31, l.e31, m.e12);
-  const S c_e1i = dot(-l.e3i, m.e31, l.e2i, m.e12, -l.e12, m.e2i, l.e31, m.e3i);
-  const S c_e2i = dot(l.e3i, m.e23, -l.e1i, m.e12, l.e12, m.e1i, -l.e23, m.e3i);
-  const S c_e3i = dot(-l.e2i, m.e23, l.e1i, m.e31, -l.e31, m.e1i, l.e23, m.e2i);
-  return {.e23 = mul_add(S(2), dot(-c_e12, m.e31, -c_e13, m.e12, c_e23, m.s), l.e23),
-          .e31 = mul_add(S(2), dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12), l.e31),
-          .e12 = mul_add(S(2), dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31), l.e12),
-          .e1i = mul_add(S(2),
-                         dot(-c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i,
-                             m.e12, -c_e3i, m.e31),
-                         l.e1i),
-          .e2i = mul_add(S(2),
-                         dot(c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s,
-                             c_e3i, m.e23),
-                         l.e2i),
-          .e3i = mul_add(S(2),
-                         dot(-c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i,
-                             m.e23, c_e3i, m.s),
-                         l.e3i)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e3i = S(2) * m.e3i;
+  const S c_e12 = dot(-l.e31, twice_e23, l.e23, twice_e31);
+  const S c_e13 = dot(-l.e12, twice_e23, l.e23, twice_e12);
+  const S c_e23 = dot(-l.e12, twice_e31, l.e31, twice_e12);
+  const S c_e1i = dot(-l.e3i, twice_e31, l.e2i, twice_e12, -l.e12, twice_e2i, l.e31, twice_e3i);
+  const S c_e2i = dot(l.e3i, twice_e23, -l.e1i, twice_e12, l.e12, twice_e1i, -l.e23, twice_e3i);
+  const S c_e3i = dot(-l.e2i, twice_e23, l.e1i, twice_e31, -l.e31, twice_e1i, l.e23, twice_e2i);
+  return {.e23 = dot(l.e23, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s),
+          .e31 = dot(l.e31, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12),
+          .e12 = dot(l.e12, c_e12, m.s, c_e13, m.e23, c_e23, m.e31),
+          .e1i = dot(l.e1i, -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12,
+                     -c_e3i, m.e31),
+          .e2i = dot(l.e2i, c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s,
+                     c_e3i, m.e23),
+          .e3i = dot(l.e3i, -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i,
+                     m.e23, c_e3i, m.s)};
 }
 
 /// sandwich: Rotor Vector -> Vector
@@ -1482,30 +1482,34 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> sandwich(const Rotor<S>& r,
                                                           const Vector<S>& v) noexcept {
-  const S c_e1 = dot(-r.e31, v.e3, r.e12, v.e2);
-  const S c_e2 = dot(r.e23, v.e3, -r.e12, v.e1);
-  const S c_e3 = dot(-r.e23, v.e2, r.e31, v.e1);
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S c_e1 = dot(-twice_e31, v.e3, twice_e12, v.e2);
+  const S c_e2 = dot(twice_e23, v.e3, -twice_e12, v.e1);
+  const S c_e3 = dot(-twice_e23, v.e2, twice_e31, v.e1);
   return {.e0 = v.e0,
-          .e1 = mul_add(S(2), dot(c_e1, r.s, c_e2, r.e12, -c_e3, r.e31), v.e1),
-          .e2 = mul_add(S(2), dot(-c_e1, r.e12, c_e2, r.s, c_e3, r.e23), v.e2),
-          .e3 = mul_add(S(2), dot(c_e1, r.e31, -c_e2, r.e23, c_e3, r.s), v.e3),
+          .e1 = dot(v.e1, c_e1, r.s, c_e2, r.e12, -c_e3, r.e31),
+          .e2 = dot(v.e2, -c_e1, r.e12, c_e2, r.s, c_e3, r.e23),
+          .e3 = dot(v.e3, c_e1, r.e31, -c_e2, r.e23, c_e3, r.s),
           .ei = v.ei};
 }
 
 /// sandwich: Dilator Vector -> Vector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 8 mul, 4 add (4 fused).
+/// Cost: 7 mul, 4 add (4 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> sandwich(const Dilator<S>& d,
                                                           const Vector<S>& v) noexcept {
-  const S c_e0 = d.e0i * v.e0;
-  const S c_ei = d.e0i * v.ei;
-  return {.e0 = mul_add(S(2), dot(-c_e0, d.s, c_e0, d.e0i), v.e0),
+  const S twice_e0i = S(2) * d.e0i;
+  const S c_e0 = twice_e0i * v.e0;
+  const S c_ei = twice_e0i * v.ei;
+  return {.e0 = dot(v.e0, -c_e0, d.s, c_e0, d.e0i),
           .e1 = v.e1,
           .e2 = v.e2,
           .e3 = v.e3,
-          .ei = mul_add(S(2), dot(c_ei, d.s, c_ei, d.e0i), v.ei)};
+          .ei = dot(v.ei, c_ei, d.s, c_ei, d.e0i)};
 }
 
 /// reverse: Versor -> Versor
@@ -2002,7 +2006,7 @@ template <class S>
 /// inverse: Even -> Even
 /// a⁻¹: a a⁻¹ = 1.
 /// Not finite where a has no inverse.
-/// Cost: 147 mul, 112 add (75 fused), 2 div, 33 select.
+/// Cost: 147 mul, 112 add (67 fused), 2 div, 33 select.
 template <class S>
 [[nodiscard]] constexpr Even<S> inverse(const Even<S>& a) noexcept {
   const S a_s = a.s - a.e0i;
@@ -2385,9 +2389,9 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 37 mul, 6 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 5 compensated_dot_pair, 1
-/// compensated_dot_parts, 1 double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling,
-/// 17 select, 1 sqrt.
+/// Cost: 38 mul, 8 add (3 fused), 5 div, 1 atan2, 4 compensated_dot, 4 compensated_dot_pair, 2
+/// compensated_dot_parts, 4 double_word_product, 1 double_word_reciprocal, 1 double_word_sqrt, 2
+/// max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Line<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
@@ -2410,42 +2414,40 @@ template <class S>
   const S root = select(m.s > S(0), q_scaling.root_out, r_scaling.root_in * q_scaling.root_out);
   const auto inverse = scalar::double_word_reciprocal(squares);
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e3i, -r_e13, q_e2i, r_e23, q_e1i);
-  const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
-                                                  overlap.lo, inverse.hi);
+  const auto share = scalar::double_word_product(overlap, inverse);
+  const auto pitch = scalar::compensated_dot_parts(m.s, share.hi, q_e123i, r_scaling.out);
   const S norm2 =
       scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
-  const S along =
-      -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e123i, r_scaling.out) / norm2;
+  const S along = -(pitch.hi + mul_add(m.s, share.lo, pitch.lo)) / norm2;
   const auto moment_e2i = scalar::compensated_dot_pair(-r_e12, q_e1i, r_e23, q_e3i);
-  const S n_e2i = scalar::compensated_dot(moment_e2i.hi, inverse.hi, moment_e2i.hi, inverse.lo,
-                                          moment_e2i.lo, inverse.hi);
+  const auto n_e2i = scalar::double_word_product(moment_e2i, inverse);
   const auto moment_e1i = scalar::compensated_dot_pair(r_e12, q_e2i, r_e13, q_e3i);
-  const S n_e1i = scalar::compensated_dot(moment_e1i.hi, inverse.hi, moment_e1i.hi, inverse.lo,
-                                          moment_e1i.lo, inverse.hi);
+  const auto n_e1i = scalar::double_word_product(moment_e1i, inverse);
   const auto moment_e3i = scalar::compensated_dot_pair(-r_e13, q_e1i, -r_e23, q_e2i);
-  const S n_e3i = scalar::compensated_dot(moment_e3i.hi, inverse.hi, moment_e3i.hi, inverse.lo,
-                                          moment_e3i.lo, inverse.hi);
+  const auto n_e3i = scalar::double_word_product(moment_e3i, inverse);
   const S q_length = scalar::sqrt(dot(q_e1i, q_e1i, q_e2i, q_e2i, q_e3i, q_e3i));
   const S turn = select(q_length > S(0), half_turn / q_length, S(0));
-  return {
-      .e23 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
-                    select(q_length > S(0), turn * q_e1i, S(0))),
-      .e31 = -select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
-                     select(q_length > S(0), turn * -q_e2i, S(0))),
-      .e12 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
-                    select(q_length > S(0), turn * q_e3i, half_turn)),
-      .e1i = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(r_e12, n_e2i, r_e13, n_e3i) * root * root +
-                        along * -r_e23 * q_scaling.out,
-                    straight * m.e1i),
-      .e2i = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(-r_e12, n_e1i, r_e23, n_e3i) * root * root +
-                        along * r_e13 * q_scaling.out,
-                    straight * m.e2i),
-      .e3i = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(-r_e13, n_e1i, -r_e23, n_e2i) * root * root +
-                        along * -r_e12 * q_scaling.out,
-                    straight * m.e3i)};
+  return {.e23 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
+                        select(q_length > S(0), turn * q_e1i, S(0))),
+          .e31 = -select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
+                         select(q_length > S(0), turn * -q_e2i, S(0))),
+          .e12 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
+                        select(q_length > S(0), turn * q_e3i, half_turn)),
+          .e1i = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(r_e12, n_e2i.hi, r_e13, n_e3i.hi) * root * root +
+                  along * -r_e23 * q_scaling.out,
+              straight * m.e1i),
+          .e2i = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(-r_e12, n_e1i.hi, r_e23, n_e3i.hi) * root * root +
+                  along * r_e13 * q_scaling.out,
+              straight * m.e2i),
+          .e3i = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(-r_e13, n_e1i.hi, -r_e23, n_e2i.hi) * root * root +
+                  along * -r_e12 * q_scaling.out,
+              straight * m.e3i)};
 }
 
 /// log: Versor -> Bivector
@@ -2779,7 +2781,7 @@ template <class S>
 /// normalize: Motor -> Motor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
-/// Cost: 37 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
+/// Cost: 34 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
@@ -2796,14 +2798,15 @@ template <class S>
   const S q_e123i = q_scaling.in * m.e123i;
   const S root = r_scaling.root_in * q_scaling.root_out;
   const S slip = dot(r_s, q_e123i, -r_e12, q_e3i, r_e13, q_e2i, -r_e23, q_e1i) / square;
+  const S factor = inverse * root;
   return {.s = inverse * r_s,
           .e23 = inverse * r_e23,
           .e31 = -(inverse * r_e13),
           .e12 = inverse * r_e12,
-          .e1i = mul_add(-slip, -r_e23, q_e1i) * inverse * root * root,
-          .e2i = mul_add(-slip, r_e13, q_e2i) * inverse * root * root,
-          .e3i = mul_add(-slip, -r_e12, q_e3i) * inverse * root * root,
-          .e123i = mul_add(-slip, r_s, q_e123i) * inverse * root * root};
+          .e1i = mul_add(-slip, -r_e23, q_e1i) * root * factor,
+          .e2i = mul_add(-slip, r_e13, q_e2i) * root * factor,
+          .e3i = mul_add(-slip, -r_e12, q_e3i) * root * factor,
+          .e123i = mul_add(-slip, r_s, q_e123i) * root * factor};
 }
 
 /// normalize: Rotor -> Rotor

@@ -46,22 +46,28 @@ template <class S>
 
 /// kinematics: Motor Rate -> Motor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 44 mul, 28 add (24 fused).  Sparsity: 36 of 48 pairs of components.
+/// Cost: 42 mul, 28 add (24 fused).  Sparsity: 36 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> kinematics(const Motor<S>& m,
                                                            const se3::Rate<S>& w) noexcept {
-  return {.s = S(0.5) * dot(m.e23, w.w23, m.e31, w.w31, m.e12, w.w12),
-          .e23 = S(0.5) * dot(-m.s, w.w23, m.e31, w.w12, -m.e12, w.w31),
-          .e31 = S(0.5) * dot(-m.s, w.w31, -m.e23, w.w12, m.e12, w.w23),
-          .e12 = S(0.5) * dot(-m.s, w.w12, m.e23, w.w31, -m.e31, w.w23),
-          .e1i = S(0.5) * dot(-m.s, w.v1, m.e31, w.v3, -m.e12, w.v2, m.e2i, w.w12, -m.e3i, w.w31,
-                              m.e123i, w.w23),
-          .e2i = S(0.5) * dot(-m.s, w.v2, -m.e23, w.v3, m.e12, w.v1, -m.e1i, w.w12, m.e3i, w.w23,
-                              m.e123i, w.w31),
-          .e3i = S(0.5) * dot(-m.s, w.v3, m.e23, w.v2, -m.e31, w.v1, m.e1i, w.w31, -m.e2i, w.w23,
-                              m.e123i, w.w12),
-          .e123i = S(0.5) * dot(-m.e23, w.v1, -m.e31, w.v2, -m.e12, w.v3, -m.e1i, w.w23, -m.e2i,
-                                w.w31, -m.e3i, w.w12)};
+  const S half_w23 = S(0.5) * w.w23;
+  const S half_w31 = S(0.5) * w.w31;
+  const S half_w12 = S(0.5) * w.w12;
+  const S half_v1 = S(0.5) * w.v1;
+  const S half_v2 = S(0.5) * w.v2;
+  const S half_v3 = S(0.5) * w.v3;
+  return {.s = dot(half_w23, m.e23, half_w31, m.e31, half_w12, m.e12),
+          .e23 = dot(-half_w23, m.s, half_w12, m.e31, -half_w31, m.e12),
+          .e31 = dot(-half_w31, m.s, -half_w12, m.e23, half_w23, m.e12),
+          .e12 = dot(-half_w12, m.s, half_w31, m.e23, -half_w23, m.e31),
+          .e1i = dot(-half_v1, m.s, half_v3, m.e31, -half_v2, m.e12, half_w12, m.e2i, -half_w31,
+                     m.e3i, half_w23, m.e123i),
+          .e2i = dot(-half_v2, m.s, -half_v3, m.e23, half_v1, m.e12, -half_w12, m.e1i, half_w23,
+                     m.e3i, half_w31, m.e123i),
+          .e3i = dot(-half_v3, m.s, half_v2, m.e23, -half_v1, m.e31, half_w31, m.e1i, -half_w23,
+                     m.e2i, half_w12, m.e123i),
+          .e123i = dot(-half_v1, m.e23, -half_v2, m.e31, -half_v3, m.e12, -half_w23, m.e1i,
+                       -half_w31, m.e2i, -half_w12, m.e3i)};
 }
 
 /// Ad: Motor Rate -> Rate
@@ -71,27 +77,27 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> Ad(const Motor<S>& m,
                                                        const se3::Rate<S>& w) noexcept {
-  const S c_e12 = dot(m.e23, w.w31, -m.e31, w.w23);
-  const S c_e13 = dot(m.e23, w.w12, -m.e12, w.w23);
-  const S c_e23 = dot(m.e31, w.w12, -m.e12, w.w31);
-  const S c_e1i = dot(m.e31, w.v3, -m.e12, w.v2, m.e2i, w.w12, -m.e3i, w.w31);
-  const S c_e2i = dot(-m.e23, w.v3, m.e12, w.v1, -m.e1i, w.w12, m.e3i, w.w23);
-  const S c_e3i = dot(m.e23, w.v2, -m.e31, w.v1, m.e1i, w.w31, -m.e2i, w.w23);
-  return {.w23 = mul_add(S(2), dot(c_e12, m.e31, c_e13, m.e12, -c_e23, m.s), w.w23),
-          .w31 = mul_add(S(2), dot(-c_e12, m.e23, c_e13, m.s, c_e23, m.e12), w.w31),
-          .w12 = mul_add(S(-2), dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31), w.w12),
-          .v1 = mul_add(S(2),
-                        dot(c_e12, m.e2i, c_e13, m.e3i, c_e23, m.e123i, -c_e1i, m.s, -c_e2i, m.e12,
-                            c_e3i, m.e31),
-                        w.v1),
-          .v2 = mul_add(S(2),
-                        dot(-c_e12, m.e1i, -c_e13, m.e123i, c_e23, m.e3i, c_e1i, m.e12, -c_e2i, m.s,
-                            -c_e3i, m.e23),
-                        w.v2),
-          .v3 = mul_add(S(2),
-                        dot(c_e12, m.e123i, -c_e13, m.e1i, -c_e23, m.e2i, -c_e1i, m.e31, c_e2i,
-                            m.e23, -c_e3i, m.s),
-                        w.v3)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e3i = S(2) * m.e3i;
+  const S c_e12 = dot(twice_e23, w.w31, -twice_e31, w.w23);
+  const S c_e13 = dot(twice_e23, w.w12, -twice_e12, w.w23);
+  const S c_e23 = dot(twice_e31, w.w12, -twice_e12, w.w31);
+  const S c_e1i = dot(twice_e31, w.v3, -twice_e12, w.v2, twice_e2i, w.w12, -twice_e3i, w.w31);
+  const S c_e2i = dot(-twice_e23, w.v3, twice_e12, w.v1, -twice_e1i, w.w12, twice_e3i, w.w23);
+  const S c_e3i = dot(twice_e23, w.v2, -twice_e31, w.v1, twice_e1i, w.w31, -twice_e2i, w.w23);
+  return {.w23 = dot(w.w23, c_e12, m.e31, c_e13, m.e12, -c_e23, m.s),
+          .w31 = dot(w.w31, -c_e12, m.e23, c_e13, m.s, c_e23, m.e12),
+          .w12 = dot(w.w12, -c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31),
+          .v1 = dot(w.v1, c_e12, m.e2i, c_e13, m.e3i, c_e23, m.e123i, -c_e1i, m.s, -c_e2i, m.e12,
+                    c_e3i, m.e31),
+          .v2 = dot(w.v2, -c_e12, m.e1i, -c_e13, m.e123i, c_e23, m.e3i, c_e1i, m.e12, -c_e2i, m.s,
+                    -c_e3i, m.e23),
+          .v3 = dot(w.v3, c_e12, m.e123i, -c_e13, m.e1i, -c_e23, m.e2i, -c_e1i, m.e31, c_e2i, m.e23,
+                    -c_e3i, m.s)};
 }
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
@@ -101,27 +107,27 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> Ad_star_inverse(
     const Motor<S>& m, const se3::Momentum<S>& mu) noexcept {
-  const S c_e012 = dot(m.e23, mu.p2, -m.e31, mu.p1);
-  const S c_e013 = dot(m.e23, mu.p3, -m.e12, mu.p1);
-  const S c_e023 = dot(m.e31, mu.p3, -m.e12, mu.p2);
-  const S c_e01i = dot(m.e31, mu.l12, -m.e12, mu.l31, m.e2i, mu.p3, -m.e3i, mu.p2);
-  const S c_e02i = dot(-m.e23, mu.l12, m.e12, mu.l23, -m.e1i, mu.p3, m.e3i, mu.p1);
-  const S c_e03i = dot(m.e23, mu.l31, -m.e31, mu.l23, m.e1i, mu.p2, -m.e2i, mu.p1);
-  return {.l23 = mul_add(S(2),
-                         dot(c_e012, m.e2i, c_e013, m.e3i, c_e023, m.e123i, -c_e01i, m.s, -c_e02i,
-                             m.e12, c_e03i, m.e31),
-                         mu.l23),
-          .l31 = mul_add(S(2),
-                         dot(-c_e012, m.e1i, -c_e013, m.e123i, c_e023, m.e3i, c_e01i, m.e12,
-                             -c_e02i, m.s, -c_e03i, m.e23),
-                         mu.l31),
-          .l12 = mul_add(S(2),
-                         dot(c_e012, m.e123i, -c_e013, m.e1i, -c_e023, m.e2i, -c_e01i, m.e31,
-                             c_e02i, m.e23, -c_e03i, m.s),
-                         mu.l12),
-          .p1 = mul_add(S(2), dot(c_e012, m.e31, c_e013, m.e12, -c_e023, m.s), mu.p1),
-          .p2 = mul_add(S(2), dot(-c_e012, m.e23, c_e013, m.s, c_e023, m.e12), mu.p2),
-          .p3 = mul_add(S(-2), dot(c_e012, m.s, c_e013, m.e23, c_e023, m.e31), mu.p3)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e1i = S(2) * m.e1i;
+  const S twice_e2i = S(2) * m.e2i;
+  const S twice_e3i = S(2) * m.e3i;
+  const S c_e012 = dot(mu.p2, twice_e23, -mu.p1, twice_e31);
+  const S c_e013 = dot(mu.p3, twice_e23, -mu.p1, twice_e12);
+  const S c_e023 = dot(mu.p3, twice_e31, -mu.p2, twice_e12);
+  const S c_e01i = dot(mu.l12, twice_e31, -mu.l31, twice_e12, mu.p3, twice_e2i, -mu.p2, twice_e3i);
+  const S c_e02i = dot(-mu.l12, twice_e23, mu.l23, twice_e12, -mu.p3, twice_e1i, mu.p1, twice_e3i);
+  const S c_e03i = dot(mu.l31, twice_e23, -mu.l23, twice_e31, mu.p2, twice_e1i, -mu.p1, twice_e2i);
+  return {.l23 = dot(mu.l23, c_e012, m.e2i, c_e013, m.e3i, c_e023, m.e123i, -c_e01i, m.s, -c_e02i,
+                     m.e12, c_e03i, m.e31),
+          .l31 = dot(mu.l31, -c_e012, m.e1i, -c_e013, m.e123i, c_e023, m.e3i, c_e01i, m.e12,
+                     -c_e02i, m.s, -c_e03i, m.e23),
+          .l12 = dot(mu.l12, c_e012, m.e123i, -c_e013, m.e1i, -c_e023, m.e2i, -c_e01i, m.e31,
+                     c_e02i, m.e23, -c_e03i, m.s),
+          .p1 = dot(mu.p1, c_e012, m.e31, c_e013, m.e12, -c_e023, m.s),
+          .p2 = dot(mu.p2, -c_e012, m.e23, c_e013, m.s, c_e023, m.e12),
+          .p3 = dot(mu.p3, -c_e012, m.s, -c_e013, m.e23, -c_e023, m.e31)};
 }
 
 /// pairing: Momentum Rate -> Scalar
@@ -136,7 +142,7 @@ template <class S>
 /// dexp: Rate Rate -> Rate
 /// Σ (−1)^k/(k+1)! ad_a^k b: the body rate of exp(a) where a changes at rate b.
 /// M = M0 exp(a) has ~M M' = dexp(a, a').
-/// Cost: 61 mul, 46 add (40 fused), 1 dexp_dual_rotation.
+/// Cost: 61 mul, 46 add (37 fused), 1 dexp_dual_rotation.
 template <class S>
 [[nodiscard]] constexpr se3::Rate<S> dexp(const se3::Rate<S>& a, const se3::Rate<S>& b) noexcept {
   const S bracket_w23 = dot(a.w31, b.w12, -a.w12, b.w31);
@@ -247,9 +253,9 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 43 mul, 6 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 5 compensated_dot_pair, 1
-/// compensated_dot_parts, 1 double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling,
-/// 17 select, 1 sqrt.
+/// Cost: 44 mul, 8 add (3 fused), 5 div, 1 atan2, 4 compensated_dot, 4 compensated_dot_pair, 2
+/// compensated_dot_parts, 4 double_word_product, 1 double_word_reciprocal, 1 double_word_sqrt, 2
+/// max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
@@ -272,21 +278,17 @@ template <class S>
   const S root = select(m.s > S(0), q_scaling.root_out, r_scaling.root_in * q_scaling.root_out);
   const auto inverse = scalar::double_word_reciprocal(squares);
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e3i, -r_e13, q_e2i, r_e23, q_e1i);
-  const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
-                                                  overlap.lo, inverse.hi);
+  const auto share = scalar::double_word_product(overlap, inverse);
+  const auto pitch = scalar::compensated_dot_parts(m.s, share.hi, q_e123i, r_scaling.out);
   const S norm2 =
       scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
-  const S along =
-      -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e123i, r_scaling.out) / norm2;
+  const S along = -(pitch.hi + mul_add(m.s, share.lo, pitch.lo)) / norm2;
   const auto moment_e2i = scalar::compensated_dot_pair(-r_e12, q_e1i, r_e23, q_e3i);
-  const S n_e2i = scalar::compensated_dot(moment_e2i.hi, inverse.hi, moment_e2i.hi, inverse.lo,
-                                          moment_e2i.lo, inverse.hi);
+  const auto n_e2i = scalar::double_word_product(moment_e2i, inverse);
   const auto moment_e1i = scalar::compensated_dot_pair(r_e12, q_e2i, r_e13, q_e3i);
-  const S n_e1i = scalar::compensated_dot(moment_e1i.hi, inverse.hi, moment_e1i.hi, inverse.lo,
-                                          moment_e1i.lo, inverse.hi);
+  const auto n_e1i = scalar::double_word_product(moment_e1i, inverse);
   const auto moment_e3i = scalar::compensated_dot_pair(-r_e13, q_e1i, -r_e23, q_e2i);
-  const S n_e3i = scalar::compensated_dot(moment_e3i.hi, inverse.hi, moment_e3i.hi, inverse.lo,
-                                          moment_e3i.lo, inverse.hi);
+  const auto n_e3i = scalar::double_word_product(moment_e3i, inverse);
   const S q_length = scalar::sqrt(dot(q_e1i, q_e1i, q_e2i, q_e2i, q_e3i, q_e3i));
   const S turn = select(q_length > S(0), half_turn / q_length, S(0));
   return {
@@ -296,21 +298,21 @@ template <class S>
                            select(q_length > S(0), turn * -q_e2i, S(0))),
       .w12 = S(-2) * select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
                             select(q_length > S(0), turn * q_e3i, half_turn)),
-      .v1 = S(-2) *
-            select(root_of_squares.hi > S(0),
-                   stretch * -scalar::compensated_dot(r_e12, n_e2i, r_e13, n_e3i) * root * root +
-                       along * -r_e23 * q_scaling.out,
-                   straight * m.e1i),
-      .v2 = S(-2) *
-            select(root_of_squares.hi > S(0),
-                   stretch * -scalar::compensated_dot(-r_e12, n_e1i, r_e23, n_e3i) * root * root +
-                       along * r_e13 * q_scaling.out,
-                   straight * m.e2i),
-      .v3 = S(-2) *
-            select(root_of_squares.hi > S(0),
-                   stretch * -scalar::compensated_dot(-r_e13, n_e1i, -r_e23, n_e2i) * root * root +
-                       along * -r_e12 * q_scaling.out,
-                   straight * m.e3i)};
+      .v1 = S(-2) * select(root_of_squares.hi > S(0),
+                           stretch * -scalar::compensated_dot(r_e12, n_e2i.hi, r_e13, n_e3i.hi) *
+                                   root * root +
+                               along * -r_e23 * q_scaling.out,
+                           straight * m.e1i),
+      .v2 = S(-2) * select(root_of_squares.hi > S(0),
+                           stretch * -scalar::compensated_dot(-r_e12, n_e1i.hi, r_e23, n_e3i.hi) *
+                                   root * root +
+                               along * r_e13 * q_scaling.out,
+                           straight * m.e2i),
+      .v3 = S(-2) * select(root_of_squares.hi > S(0),
+                           stretch * -scalar::compensated_dot(-r_e13, n_e1i.hi, -r_e23, n_e2i.hi) *
+                                   root * root +
+                               along * -r_e12 * q_scaling.out,
+                           straight * m.e3i)};
 }
 
 /// cayley: Rate -> Motor

@@ -562,12 +562,15 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Direction<S> sandwich(const Motor<S>& m,
                                                              const Direction<S>& d) noexcept {
-  const S c_e012 = dot(d.e013, m.e23, -d.e032, m.e31);
-  const S c_e013 = dot(d.e021, m.e23, -d.e032, m.e12);
-  const S c_e023 = dot(d.e021, m.e31, -d.e013, m.e12);
-  return {.e032 = mul_add(S(2), dot(c_e012, m.e31, c_e013, m.e12, -c_e023, m.s), d.e032),
-          .e013 = mul_add(S(2), dot(-c_e012, m.e23, c_e013, m.s, c_e023, m.e12), d.e013),
-          .e021 = mul_add(S(-2), dot(c_e012, m.s, c_e013, m.e23, c_e023, m.e31), d.e021)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S c_e012 = dot(d.e013, twice_e23, -d.e032, twice_e31);
+  const S c_e013 = dot(d.e021, twice_e23, -d.e032, twice_e12);
+  const S c_e023 = dot(d.e021, twice_e31, -d.e013, twice_e12);
+  return {.e032 = dot(d.e032, c_e012, m.e31, c_e013, m.e12, -c_e023, m.s),
+          .e013 = dot(d.e013, -c_e012, m.e23, c_e013, m.s, c_e023, m.e12),
+          .e021 = dot(d.e021, -c_e012, m.s, -c_e013, m.e23, -c_e023, m.e31)};
 }
 
 /// sandwich: Motor Trivector -> Trivector
@@ -595,27 +598,27 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Motor<S>& m,
                                                             const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12, -b.e12, m.e02, b.e31, m.e03);
-  const S c_e02 = dot(b.e03, m.e23, -b.e01, m.e12, b.e12, m.e01, -b.e23, m.e03);
-  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31);
-  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31, -b.e31, m.e01, b.e23, m.e02);
-  const S c_e13 = dot(-b.e12, m.e23, b.e23, m.e12);
-  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12);
-  return {.e23 = mul_add(S(2), dot(-c_e12, m.e31, -c_e13, m.e12, c_e23, m.s), b.e23),
-          .e31 = mul_add(S(2), dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12), b.e31),
-          .e12 = mul_add(S(2), dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31), b.e12),
-          .e01 = mul_add(S(2),
-                         dot(-c_e12, m.e02, -c_e13, m.e03, -c_e23, m.e0123, c_e01, m.s, c_e02,
-                             m.e12, -c_e03, m.e31),
-                         b.e01),
-          .e02 = mul_add(S(2),
-                         dot(c_e12, m.e01, c_e13, m.e0123, -c_e23, m.e03, -c_e01, m.e12, c_e02, m.s,
-                             c_e03, m.e23),
-                         b.e02),
-          .e03 = mul_add(S(2),
-                         dot(-c_e12, m.e0123, c_e13, m.e01, c_e23, m.e02, c_e01, m.e31, -c_e02,
-                             m.e23, c_e03, m.s),
-                         b.e03)};
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S twice_e01 = S(2) * m.e01;
+  const S twice_e02 = S(2) * m.e02;
+  const S twice_e03 = S(2) * m.e03;
+  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12, -b.e12, twice_e02, b.e31, twice_e03);
+  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12, b.e12, twice_e01, -b.e23, twice_e03);
+  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31);
+  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31, -b.e31, twice_e01, b.e23, twice_e02);
+  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12);
+  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12);
+  return {.e23 = dot(b.e23, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s),
+          .e31 = dot(b.e31, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12),
+          .e12 = dot(b.e12, c_e12, m.s, c_e13, m.e23, c_e23, m.e31),
+          .e01 = dot(b.e01, -c_e12, m.e02, -c_e13, m.e03, -c_e23, m.e0123, c_e01, m.s, c_e02, m.e12,
+                     -c_e03, m.e31),
+          .e02 = dot(b.e02, c_e12, m.e01, c_e13, m.e0123, -c_e23, m.e03, -c_e01, m.e12, c_e02, m.s,
+                     c_e03, m.e23),
+          .e03 = dot(b.e03, -c_e12, m.e0123, c_e13, m.e01, c_e23, m.e02, c_e01, m.e31, -c_e02,
+                     m.e23, c_e03, m.s)};
 }
 
 /// sandwich: Motor Plane -> Plane
@@ -625,14 +628,18 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Plane<S> sandwich(const Motor<S>& m,
                                                          const Plane<S>& p) noexcept {
-  const S y_e1 = dot(m.s, p.e1, m.e12, p.e2, -m.e31, p.e3);
-  const S y_e2 = dot(-m.e12, p.e1, m.s, p.e2, m.e23, p.e3);
-  const S y_e3 = dot(m.e31, p.e1, -m.e23, p.e2, m.s, p.e3);
-  const S y_e123 = dot(m.e23, p.e1, m.e31, p.e2, m.e12, p.e3);
-  return {.e0 = mul_add(S(2), dot(m.e01, y_e1, m.e02, y_e2, m.e03, y_e3, m.e0123, y_e123), p.e0),
-          .e1 = mul_add(S(2), dot(-m.e31, y_e3, m.e12, y_e2), p.e1),
-          .e2 = mul_add(S(2), dot(m.e23, y_e3, -m.e12, y_e1), p.e2),
-          .e3 = mul_add(S(2), dot(-m.e23, y_e2, m.e31, y_e1), p.e3)};
+  const S twice_s = S(2) * m.s;
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S y_e1 = dot(p.e1, twice_s, p.e2, twice_e12, -p.e3, twice_e31);
+  const S y_e2 = dot(-p.e1, twice_e12, p.e2, twice_s, p.e3, twice_e23);
+  const S y_e3 = dot(p.e1, twice_e31, -p.e2, twice_e23, p.e3, twice_s);
+  const S y_e123 = dot(p.e1, twice_e23, p.e2, twice_e31, p.e3, twice_e12);
+  return {.e0 = dot(p.e0, m.e01, y_e1, m.e02, y_e2, m.e03, y_e3, m.e0123, y_e123),
+          .e1 = dot(p.e1, -m.e31, y_e3, m.e12, y_e2),
+          .e2 = dot(p.e2, m.e23, y_e3, -m.e12, y_e1),
+          .e3 = dot(p.e3, -m.e23, y_e2, m.e31, y_e1)};
 }
 
 /// sandwich: Mirror Trivector -> Trivector
@@ -652,34 +659,40 @@ template <class S>
 /// sandwich: Mirror Bivector -> Bivector
 /// (−1)^k m x ~m, x of grade k: reflects x in m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 27 mul, 17 add (17 fused).
+/// Cost: 24 mul, 17 add (17 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Mirror<S>& p,
                                                             const Bivector<S>& b) noexcept {
-  const S c_e0 = dot(b.e01, p.e1, b.e02, p.e2, b.e03, p.e3);
-  const S c_e1 = dot(-b.e12, p.e2, b.e31, p.e3);
-  const S c_e2 = dot(b.e12, p.e1, -b.e23, p.e3);
-  const S c_e3 = dot(-b.e31, p.e1, b.e23, p.e2);
-  return {.e23 = mul_add(S(2), dot(c_e2, p.e3, -c_e3, p.e2), b.e23),
-          .e31 = mul_add(S(2), dot(-c_e1, p.e3, c_e3, p.e1), b.e31),
-          .e12 = mul_add(S(2), dot(c_e1, p.e2, -c_e2, p.e1), b.e12),
-          .e01 = mul_add(S(-2), dot(c_e1, p.e0, c_e0, p.e1), b.e01),
-          .e02 = mul_add(S(-2), dot(c_e2, p.e0, c_e0, p.e2), b.e02),
-          .e03 = mul_add(S(-2), dot(c_e3, p.e0, c_e0, p.e3), b.e03)};
+  const S twice_e1 = S(2) * p.e1;
+  const S twice_e2 = S(2) * p.e2;
+  const S twice_e3 = S(2) * p.e3;
+  const S c_e0 = dot(b.e01, twice_e1, b.e02, twice_e2, b.e03, twice_e3);
+  const S c_e1 = dot(-b.e12, twice_e2, b.e31, twice_e3);
+  const S c_e2 = dot(b.e12, twice_e1, -b.e23, twice_e3);
+  const S c_e3 = dot(-b.e31, twice_e1, b.e23, twice_e2);
+  return {.e23 = dot(b.e23, c_e2, p.e3, -c_e3, p.e2),
+          .e31 = dot(b.e31, -c_e1, p.e3, c_e3, p.e1),
+          .e12 = dot(b.e12, c_e1, p.e2, -c_e2, p.e1),
+          .e01 = dot(b.e01, -c_e1, p.e0, -c_e0, p.e1),
+          .e02 = dot(b.e02, -c_e2, p.e0, -c_e0, p.e2),
+          .e03 = dot(b.e03, -c_e3, p.e0, -c_e0, p.e3)};
 }
 
 /// sandwich: Mirror Plane -> Plane
 /// (−1)^k m x ~m, x of grade k: reflects x in m.
 /// Needs M ~M = 1: computed as −X + 2 ½(M X + X M) ~M.
-/// Cost: 11 mul, 6 add (6 fused).
+/// Cost: 10 mul, 6 add (6 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Plane<S> sandwich(const Mirror<S>& a,
                                                          const Plane<S>& b) noexcept {
-  const S c_s = dot(a.e1, b.e1, a.e2, b.e2, a.e3, b.e3);
-  return {.e0 = mul_add(S(-2), a.e0 * c_s, b.e0),
-          .e1 = mul_add(S(-2), a.e1 * c_s, b.e1),
-          .e2 = mul_add(S(-2), a.e2 * c_s, b.e2),
-          .e3 = mul_add(S(-2), a.e3 * c_s, b.e3)};
+  const S twice_e1 = S(2) * a.e1;
+  const S twice_e2 = S(2) * a.e2;
+  const S twice_e3 = S(2) * a.e3;
+  const S c_s = dot(b.e1, twice_e1, b.e2, twice_e2, b.e3, twice_e3);
+  return {.e0 = mul_add(-a.e0, c_s, b.e0),
+          .e1 = mul_add(-a.e1, c_s, b.e1),
+          .e2 = mul_add(-a.e2, c_s, b.e2),
+          .e3 = mul_add(-a.e3, c_s, b.e3)};
 }
 
 /// sandwich: Rotor Point -> Point
@@ -689,12 +702,15 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Rotor<S>& r,
                                                          const Point<S>& x) noexcept {
-  const S c_e012 = dot(r.e23, x.e013, -r.e31, x.e032);
-  const S c_e013 = dot(r.e23, x.e021, -r.e12, x.e032);
-  const S c_e023 = dot(r.e31, x.e021, -r.e12, x.e013);
-  return {.e032 = mul_add(S(2), dot(c_e012, r.e31, c_e013, r.e12, -c_e023, r.s), x.e032),
-          .e013 = mul_add(S(2), dot(-c_e012, r.e23, c_e013, r.s, c_e023, r.e12), x.e013),
-          .e021 = mul_add(S(-2), dot(c_e012, r.s, c_e013, r.e23, c_e023, r.e31), x.e021)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S c_e012 = dot(twice_e23, x.e013, -twice_e31, x.e032);
+  const S c_e013 = dot(twice_e23, x.e021, -twice_e12, x.e032);
+  const S c_e023 = dot(twice_e31, x.e021, -twice_e12, x.e013);
+  return {.e032 = dot(x.e032, c_e012, r.e31, c_e013, r.e12, -c_e023, r.s),
+          .e013 = dot(x.e013, -c_e012, r.e23, c_e013, r.s, c_e023, r.e12),
+          .e021 = dot(x.e021, -c_e012, r.s, -c_e013, r.e23, -c_e023, r.e31)};
 }
 
 /// sandwich: Rotor Direction -> Direction
@@ -704,33 +720,39 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Direction<S> sandwich(const Rotor<S>& r,
                                                              const Direction<S>& d) noexcept {
-  const S c_e012 = dot(d.e013, r.e23, -d.e032, r.e31);
-  const S c_e013 = dot(d.e021, r.e23, -d.e032, r.e12);
-  const S c_e023 = dot(d.e021, r.e31, -d.e013, r.e12);
-  return {.e032 = mul_add(S(2), dot(c_e012, r.e31, c_e013, r.e12, -c_e023, r.s), d.e032),
-          .e013 = mul_add(S(2), dot(-c_e012, r.e23, c_e013, r.s, c_e023, r.e12), d.e013),
-          .e021 = mul_add(S(-2), dot(c_e012, r.s, c_e013, r.e23, c_e023, r.e31), d.e021)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S c_e012 = dot(d.e013, twice_e23, -d.e032, twice_e31);
+  const S c_e013 = dot(d.e021, twice_e23, -d.e032, twice_e12);
+  const S c_e023 = dot(d.e021, twice_e31, -d.e013, twice_e12);
+  return {.e032 = dot(d.e032, c_e012, r.e31, c_e013, r.e12, -c_e023, r.s),
+          .e013 = dot(d.e013, -c_e012, r.e23, c_e013, r.s, c_e023, r.e12),
+          .e021 = dot(d.e021, -c_e012, r.s, -c_e013, r.e23, -c_e023, r.e31)};
 }
 
 /// sandwich: Rotor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 36 mul, 24 add (24 fused).
+/// Cost: 33 mul, 24 add (24 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Rotor<S>& r,
                                                             const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e03, r.e31, b.e02, r.e12);
-  const S c_e02 = dot(b.e03, r.e23, -b.e01, r.e12);
-  const S c_e12 = dot(-b.e31, r.e23, b.e23, r.e31);
-  const S c_e03 = dot(-b.e02, r.e23, b.e01, r.e31);
-  const S c_e13 = dot(-b.e12, r.e23, b.e23, r.e12);
-  const S c_e23 = dot(-b.e12, r.e31, b.e31, r.e12);
-  return {.e23 = mul_add(S(2), dot(-c_e12, r.e31, -c_e13, r.e12, c_e23, r.s), b.e23),
-          .e31 = mul_add(S(2), dot(c_e12, r.e23, -c_e13, r.s, -c_e23, r.e12), b.e31),
-          .e12 = mul_add(S(2), dot(c_e12, r.s, c_e13, r.e23, c_e23, r.e31), b.e12),
-          .e01 = mul_add(S(2), dot(c_e01, r.s, c_e02, r.e12, -c_e03, r.e31), b.e01),
-          .e02 = mul_add(S(2), dot(-c_e01, r.e12, c_e02, r.s, c_e03, r.e23), b.e02),
-          .e03 = mul_add(S(2), dot(c_e01, r.e31, -c_e02, r.e23, c_e03, r.s), b.e03)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
+  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12);
+  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31);
+  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
+  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12);
+  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12);
+  return {.e23 = dot(b.e23, -c_e12, r.e31, -c_e13, r.e12, c_e23, r.s),
+          .e31 = dot(b.e31, c_e12, r.e23, -c_e13, r.s, -c_e23, r.e12),
+          .e12 = dot(b.e12, c_e12, r.s, c_e13, r.e23, c_e23, r.e31),
+          .e01 = dot(b.e01, c_e01, r.s, c_e02, r.e12, -c_e03, r.e31),
+          .e02 = dot(b.e02, -c_e01, r.e12, c_e02, r.s, c_e03, r.e23),
+          .e03 = dot(b.e03, c_e01, r.e31, -c_e02, r.e23, c_e03, r.s)};
 }
 
 /// sandwich: Rotor Plane -> Plane
@@ -740,25 +762,29 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Plane<S> sandwich(const Rotor<S>& r,
                                                          const Plane<S>& p) noexcept {
-  const S c_e1 = dot(-p.e3, r.e31, p.e2, r.e12);
-  const S c_e2 = dot(p.e3, r.e23, -p.e1, r.e12);
-  const S c_e3 = dot(-p.e2, r.e23, p.e1, r.e31);
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S c_e1 = dot(-p.e3, twice_e31, p.e2, twice_e12);
+  const S c_e2 = dot(p.e3, twice_e23, -p.e1, twice_e12);
+  const S c_e3 = dot(-p.e2, twice_e23, p.e1, twice_e31);
   return {.e0 = p.e0,
-          .e1 = mul_add(S(2), dot(c_e1, r.s, c_e2, r.e12, -c_e3, r.e31), p.e1),
-          .e2 = mul_add(S(2), dot(-c_e1, r.e12, c_e2, r.s, c_e3, r.e23), p.e2),
-          .e3 = mul_add(S(2), dot(c_e1, r.e31, -c_e2, r.e23, c_e3, r.s), p.e3)};
+          .e1 = dot(p.e1, c_e1, r.s, c_e2, r.e12, -c_e3, r.e31),
+          .e2 = dot(p.e2, -c_e1, r.e12, c_e2, r.s, c_e3, r.e23),
+          .e3 = dot(p.e3, c_e1, r.e31, -c_e2, r.e23, c_e3, r.s)};
 }
 
 /// sandwich: Translator Point -> Point
 /// m x ~m: moves x by m.
-/// Needs M ~M = 1: computed as X + 2 (M × X) ~M.
-/// Cost: 6 mul, 3 add (3 fused).
+/// Needs M ~M = 1: computed as X + 2 (R × Y + <D Y>), Y = X ~R, e0 in D = M − R.
+/// Cost: 4 mul, 3 add (3 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Translator<S>& t,
                                                          const Point<S>& x) noexcept {
-  return {.e032 = mul_add(S(-2), t.e01 * t.s, x.e032),
-          .e013 = mul_add(S(-2), t.e02 * t.s, x.e013),
-          .e021 = mul_add(S(-2), t.e03 * t.s, x.e021)};
+  const S twice_s = S(2) * t.s;
+  return {.e032 = mul_add(-t.e01, twice_s, x.e032),
+          .e013 = mul_add(-t.e02, twice_s, x.e013),
+          .e021 = mul_add(-t.e03, twice_s, x.e021)};
 }
 
 /// sandwich: Translator Plane -> Plane
@@ -1261,9 +1287,9 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 37 mul, 6 add (2 fused), 5 div, 1 atan2, 8 compensated_dot, 5 compensated_dot_pair, 1
-/// compensated_dot_parts, 1 double_word_reciprocal, 1 double_word_sqrt, 2 max_abs, 1 pi, 2 scaling,
-/// 17 select, 1 sqrt.
+/// Cost: 38 mul, 8 add (3 fused), 5 div, 1 atan2, 4 compensated_dot, 4 compensated_dot_pair, 2
+/// compensated_dot_parts, 4 double_word_product, 1 double_word_reciprocal, 1 double_word_sqrt, 2
+/// max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
@@ -1286,55 +1312,53 @@ template <class S>
   const S root = select(m.s > S(0), q_scaling.root_out, r_scaling.root_in * q_scaling.root_out);
   const auto inverse = scalar::double_word_reciprocal(squares);
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e03, -r_e13, q_e02, r_e23, q_e01);
-  const auto share = scalar::compensated_dot_pair(overlap.hi, inverse.hi, overlap.hi, inverse.lo,
-                                                  overlap.lo, inverse.hi);
+  const auto share = scalar::double_word_product(overlap, inverse);
+  const auto pitch = scalar::compensated_dot_parts(m.s, share.hi, q_e0123, r_scaling.out);
   const S norm2 =
       scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
-  const S along =
-      -scalar::compensated_dot(m.s, share.hi, m.s, share.lo, q_e0123, r_scaling.out) / norm2;
+  const S along = -(pitch.hi + mul_add(m.s, share.lo, pitch.lo)) / norm2;
   const auto moment_e02 = scalar::compensated_dot_pair(-r_e12, q_e01, r_e23, q_e03);
-  const S n_e02 = scalar::compensated_dot(moment_e02.hi, inverse.hi, moment_e02.hi, inverse.lo,
-                                          moment_e02.lo, inverse.hi);
+  const auto n_e02 = scalar::double_word_product(moment_e02, inverse);
   const auto moment_e01 = scalar::compensated_dot_pair(r_e12, q_e02, r_e13, q_e03);
-  const S n_e01 = scalar::compensated_dot(moment_e01.hi, inverse.hi, moment_e01.hi, inverse.lo,
-                                          moment_e01.lo, inverse.hi);
+  const auto n_e01 = scalar::double_word_product(moment_e01, inverse);
   const auto moment_e03 = scalar::compensated_dot_pair(-r_e13, q_e01, -r_e23, q_e02);
-  const S n_e03 = scalar::compensated_dot(moment_e03.hi, inverse.hi, moment_e03.hi, inverse.lo,
-                                          moment_e03.lo, inverse.hi);
+  const auto n_e03 = scalar::double_word_product(moment_e03, inverse);
   const S q_length = scalar::sqrt(dot(q_e01, q_e01, q_e02, q_e02, q_e03, q_e03));
   const S turn = select(q_length > S(0), half_turn / q_length, S(0));
-  return {
-      .e23 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
-                    select(q_length > S(0), turn * q_e01, S(0))),
-      .e31 = -select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
-                     select(q_length > S(0), turn * -q_e02, S(0))),
-      .e12 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
-                    select(q_length > S(0), turn * q_e03, half_turn)),
-      .e01 = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(r_e12, n_e02, r_e13, n_e03) * root * root +
-                        along * -r_e23 * q_scaling.out,
-                    straight * m.e01),
-      .e02 = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(-r_e12, n_e01, r_e23, n_e03) * root * root +
-                        along * r_e13 * q_scaling.out,
-                    straight * m.e02),
-      .e03 = select(root_of_squares.hi > S(0),
-                    stretch * -scalar::compensated_dot(-r_e13, n_e01, -r_e23, n_e02) * root * root +
-                        along * -r_e12 * q_scaling.out,
-                    straight * m.e03)};
+  return {.e23 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
+                        select(q_length > S(0), turn * q_e01, S(0))),
+          .e31 = -select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
+                         select(q_length > S(0), turn * -q_e02, S(0))),
+          .e12 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
+                        select(q_length > S(0), turn * q_e03, half_turn)),
+          .e01 = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(r_e12, n_e02.hi, r_e13, n_e03.hi) * root * root +
+                  along * -r_e23 * q_scaling.out,
+              straight * m.e01),
+          .e02 = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(-r_e12, n_e01.hi, r_e23, n_e03.hi) * root * root +
+                  along * r_e13 * q_scaling.out,
+              straight * m.e02),
+          .e03 = select(
+              root_of_squares.hi > S(0),
+              stretch * -scalar::compensated_dot(-r_e13, n_e01.hi, -r_e23, n_e02.hi) * root * root +
+                  along * -r_e12 * q_scaling.out,
+              straight * m.e03)};
 }
 
 /// log_lean: Motor -> Bivector
 /// log(M), M ~M = 1.
 /// Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
-/// Cost: 12 mul, 5 add (5 fused), 2 div, 1 atan2, 2 select, 1 sqrt.
+/// Cost: 14 mul, 5 add (5 fused), 1 div, 1 acos, 2 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> log_lean(const Motor<S>& m) noexcept {
-  const S square = mul_add(-m.s, m.s, S(1));
-  const S sine = scalar::sqrt(square);
-  const S stretch = select(square > S(0), scalar::atan2(sine, m.s) / sine, S(1));
-  const S along = select(square > S(0), mul_add(stretch, m.s, S(-1)) * (m.e0123 / square), S(0));
+  const S square = scalar::fma(-m.s, m.s, S(1));
+  const S inverse = S(1) / square;
+  const S stretch = select(square > S(0), scalar::acos(m.s) * scalar::sqrt(inverse), S(1));
+  const S along = select(square > S(0), mul_add(stretch, m.s, S(-1)) * (m.e0123 * inverse), S(0));
   return {.e23 = stretch * m.e23,
           .e31 = stretch * m.e31,
           .e12 = stretch * m.e12,
@@ -1463,7 +1487,7 @@ template <class S>
 /// normalize: Motor -> Motor
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
-/// Cost: 37 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
+/// Cost: 34 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
@@ -1480,14 +1504,15 @@ template <class S>
   const S q_e0123 = q_scaling.in * m.e0123;
   const S root = r_scaling.root_in * q_scaling.root_out;
   const S slip = dot(r_s, q_e0123, -r_e12, q_e03, r_e13, q_e02, -r_e23, q_e01) / square;
+  const S factor = inverse * root;
   return {.s = inverse * r_s,
           .e23 = inverse * r_e23,
           .e31 = -(inverse * r_e13),
           .e12 = inverse * r_e12,
-          .e01 = mul_add(-slip, -r_e23, q_e01) * inverse * root * root,
-          .e02 = mul_add(-slip, r_e13, q_e02) * inverse * root * root,
-          .e03 = mul_add(-slip, -r_e12, q_e03) * inverse * root * root,
-          .e0123 = mul_add(-slip, r_s, q_e0123) * inverse * root * root};
+          .e01 = mul_add(-slip, -r_e23, q_e01) * root * factor,
+          .e02 = mul_add(-slip, r_e13, q_e02) * root * factor,
+          .e03 = mul_add(-slip, -r_e12, q_e03) * root * factor,
+          .e0123 = mul_add(-slip, r_s, q_e0123) * root * factor};
 }
 
 /// normalize: Rotor -> Rotor

@@ -35,14 +35,12 @@ template <class S>
 
 /// kinematics: Translator Rate -> Translator
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 6 mul, 0 add.  Sparsity: 3 of 12 pairs of components.
+/// Cost: 4 mul, 0 add.  Sparsity: 3 of 12 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Translator<S> kinematics(const Translator<S>& t,
                                                                 const t3::Rate<S>& w) noexcept {
-  return {.s = S(0),
-          .e01 = S(0.5) * (-t.s * w.v1),
-          .e02 = S(0.5) * (-t.s * w.v2),
-          .e03 = S(0.5) * (-t.s * w.v3)};
+  const S half_s = S(0.5) * t.s;
+  return {.s = S(0), .e01 = -half_s * w.v1, .e02 = -half_s * w.v2, .e03 = -half_s * w.v3};
 }
 
 /// Ad: Translator Rate -> Rate

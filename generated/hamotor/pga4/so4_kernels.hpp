@@ -48,26 +48,32 @@ template <class S>
 
 /// kinematics: Rotor Rate -> Rotor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 56 mul, 40 add (32 fused).  Sparsity: 48 of 48 pairs of components.
+/// Cost: 54 mul, 40 add (32 fused).  Sparsity: 48 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> kinematics(const Rotor<S>& r,
                                                            const so4::Rate<S>& w) noexcept {
-  return {.s = S(0.5) * dot(r.e12, w.w12, r.e13, w.w13, r.e14, w.w14, r.e23, w.w23, r.e24, w.w24,
-                            r.e34, w.w34),
-          .e12 = S(0.5) * dot(-r.s, w.w12, r.e13, w.w23, r.e14, w.w24, -r.e23, w.w13, -r.e24, w.w14,
-                              r.e1234, w.w34),
-          .e13 = S(0.5) * dot(-r.s, w.w13, -r.e12, w.w23, r.e14, w.w34, r.e23, w.w12, -r.e34, w.w14,
-                              -r.e1234, w.w24),
-          .e14 = S(0.5) * dot(-r.s, w.w14, -r.e12, w.w24, -r.e13, w.w34, r.e24, w.w12, r.e34, w.w13,
-                              r.e1234, w.w23),
-          .e23 = S(0.5) * dot(-r.s, w.w23, r.e12, w.w13, -r.e13, w.w12, r.e24, w.w34, -r.e34, w.w24,
-                              r.e1234, w.w14),
-          .e24 = S(0.5) * dot(-r.s, w.w24, r.e12, w.w14, -r.e14, w.w12, -r.e23, w.w34, r.e34, w.w23,
-                              -r.e1234, w.w13),
-          .e34 = S(0.5) * dot(-r.s, w.w34, r.e13, w.w14, -r.e14, w.w13, r.e23, w.w24, -r.e24, w.w23,
-                              r.e1234, w.w12),
-          .e1234 = S(0.5) * dot(-r.e12, w.w34, r.e13, w.w24, -r.e14, w.w23, -r.e23, w.w14, r.e24,
-                                w.w13, -r.e34, w.w12)};
+  const S half_w12 = S(0.5) * w.w12;
+  const S half_w13 = S(0.5) * w.w13;
+  const S half_w14 = S(0.5) * w.w14;
+  const S half_w23 = S(0.5) * w.w23;
+  const S half_w24 = S(0.5) * w.w24;
+  const S half_w34 = S(0.5) * w.w34;
+  return {.s = dot(half_w12, r.e12, half_w13, r.e13, half_w14, r.e14, half_w23, r.e23, half_w24,
+                   r.e24, half_w34, r.e34),
+          .e12 = dot(-half_w12, r.s, half_w23, r.e13, half_w24, r.e14, -half_w13, r.e23, -half_w14,
+                     r.e24, half_w34, r.e1234),
+          .e13 = dot(-half_w13, r.s, -half_w23, r.e12, half_w34, r.e14, half_w12, r.e23, -half_w14,
+                     r.e34, -half_w24, r.e1234),
+          .e14 = dot(-half_w14, r.s, -half_w24, r.e12, -half_w34, r.e13, half_w12, r.e24, half_w13,
+                     r.e34, half_w23, r.e1234),
+          .e23 = dot(-half_w23, r.s, half_w13, r.e12, -half_w12, r.e13, half_w34, r.e24, -half_w24,
+                     r.e34, half_w14, r.e1234),
+          .e24 = dot(-half_w24, r.s, half_w14, r.e12, -half_w12, r.e14, -half_w34, r.e23, half_w23,
+                     r.e34, -half_w13, r.e1234),
+          .e34 = dot(-half_w34, r.s, half_w14, r.e13, -half_w13, r.e14, half_w24, r.e23, -half_w23,
+                     r.e24, half_w12, r.e1234),
+          .e1234 = dot(-half_w34, r.e12, half_w24, r.e13, -half_w23, r.e14, -half_w14, r.e23,
+                       half_w13, r.e24, -half_w12, r.e34)};
 }
 
 /// Ad: Rotor Rate -> Rate
@@ -77,36 +83,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so4::Rate<S> Ad(const Rotor<S>& r,
                                                        const so4::Rate<S>& w) noexcept {
-  const S c_e12 = dot(r.e13, w.w23, r.e14, w.w24, -r.e23, w.w13, -r.e24, w.w14);
-  const S c_e13 = dot(-r.e12, w.w23, r.e14, w.w34, r.e23, w.w12, -r.e34, w.w14);
-  const S c_e23 = dot(r.e12, w.w13, -r.e13, w.w12, r.e24, w.w34, -r.e34, w.w24);
-  const S c_e14 = dot(-r.e12, w.w24, -r.e13, w.w34, r.e24, w.w12, r.e34, w.w13);
-  const S c_e24 = dot(r.e12, w.w14, -r.e14, w.w12, -r.e23, w.w34, r.e34, w.w23);
-  const S c_e34 = dot(r.e13, w.w14, -r.e14, w.w13, r.e23, w.w24, -r.e24, w.w23);
-  return {.w12 = mul_add(S(2),
-                         dot(-c_e12, r.s, -c_e13, r.e23, c_e23, r.e13, -c_e14, r.e24, c_e24, r.e14,
-                             c_e34, r.e1234),
-                         w.w12),
-          .w13 = mul_add(S(2),
-                         dot(c_e12, r.e23, -c_e13, r.s, -c_e23, r.e12, -c_e14, r.e34, -c_e24,
-                             r.e1234, c_e34, r.e14),
-                         w.w13),
-          .w14 = mul_add(S(2),
-                         dot(c_e12, r.e24, c_e13, r.e34, c_e23, r.e1234, -c_e14, r.s, -c_e24, r.e12,
-                             -c_e34, r.e13),
-                         w.w14),
-          .w23 = mul_add(S(2),
-                         dot(-c_e12, r.e13, c_e13, r.e12, -c_e23, r.s, c_e14, r.e1234, -c_e24,
-                             r.e34, c_e34, r.e24),
-                         w.w23),
-          .w24 = mul_add(S(2),
-                         dot(-c_e12, r.e14, -c_e13, r.e1234, c_e23, r.e34, c_e14, r.e12, -c_e24,
-                             r.s, -c_e34, r.e23),
-                         w.w24),
-          .w34 = mul_add(S(2),
-                         dot(c_e12, r.e1234, -c_e13, r.e14, -c_e23, r.e24, c_e14, r.e13, c_e24,
-                             r.e23, -c_e34, r.s),
-                         w.w34)};
+  const S twice_e12 = S(2) * r.e12;
+  const S twice_e13 = S(2) * r.e13;
+  const S twice_e14 = S(2) * r.e14;
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e24 = S(2) * r.e24;
+  const S twice_e34 = S(2) * r.e34;
+  const S c_e12 = dot(twice_e13, w.w23, twice_e14, w.w24, -twice_e23, w.w13, -twice_e24, w.w14);
+  const S c_e13 = dot(-twice_e12, w.w23, twice_e14, w.w34, twice_e23, w.w12, -twice_e34, w.w14);
+  const S c_e23 = dot(twice_e12, w.w13, -twice_e13, w.w12, twice_e24, w.w34, -twice_e34, w.w24);
+  const S c_e14 = dot(-twice_e12, w.w24, -twice_e13, w.w34, twice_e24, w.w12, twice_e34, w.w13);
+  const S c_e24 = dot(twice_e12, w.w14, -twice_e14, w.w12, -twice_e23, w.w34, twice_e34, w.w23);
+  const S c_e34 = dot(twice_e13, w.w14, -twice_e14, w.w13, twice_e23, w.w24, -twice_e24, w.w23);
+  return {.w12 = dot(w.w12, -c_e12, r.s, -c_e13, r.e23, c_e23, r.e13, -c_e14, r.e24, c_e24, r.e14,
+                     c_e34, r.e1234),
+          .w13 = dot(w.w13, c_e12, r.e23, -c_e13, r.s, -c_e23, r.e12, -c_e14, r.e34, -c_e24,
+                     r.e1234, c_e34, r.e14),
+          .w14 = dot(w.w14, c_e12, r.e24, c_e13, r.e34, c_e23, r.e1234, -c_e14, r.s, -c_e24, r.e12,
+                     -c_e34, r.e13),
+          .w23 = dot(w.w23, -c_e12, r.e13, c_e13, r.e12, -c_e23, r.s, c_e14, r.e1234, -c_e24, r.e34,
+                     c_e34, r.e24),
+          .w24 = dot(w.w24, -c_e12, r.e14, -c_e13, r.e1234, c_e23, r.e34, c_e14, r.e12, -c_e24, r.s,
+                     -c_e34, r.e23),
+          .w34 = dot(w.w34, c_e12, r.e1234, -c_e13, r.e14, -c_e23, r.e24, c_e14, r.e13, c_e24,
+                     r.e23, -c_e34, r.s)};
 }
 
 /// Ad_star_inverse: Rotor Momentum -> Momentum
@@ -116,36 +116,36 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so4::Momentum<S> Ad_star_inverse(
     const Rotor<S>& r, const so4::Momentum<S>& mu) noexcept {
-  const S c_e012 = dot(mu.l14, r.e13, -mu.l13, r.e14, mu.l24, r.e23, -mu.l23, r.e24);
-  const S c_e013 = dot(-mu.l14, r.e12, mu.l12, r.e14, mu.l34, r.e23, -mu.l23, r.e34);
-  const S c_e023 = dot(-mu.l24, r.e12, -mu.l34, r.e13, mu.l12, r.e24, mu.l13, r.e34);
-  const S c_e014 = dot(mu.l13, r.e12, -mu.l12, r.e13, mu.l34, r.e24, -mu.l24, r.e34);
-  const S c_e024 = dot(mu.l23, r.e12, -mu.l34, r.e14, -mu.l12, r.e23, mu.l14, r.e34);
-  const S c_e034 = dot(mu.l23, r.e13, mu.l24, r.e14, -mu.l13, r.e23, -mu.l14, r.e24);
-  return {.l12 = mul_add(S(2),
-                         dot(c_e012, r.e1234, -c_e013, r.e14, -c_e023, r.e24, c_e014, r.e13, c_e024,
-                             r.e23, -c_e034, r.s),
-                         mu.l12),
-          .l13 = mul_add(S(2),
-                         dot(c_e012, r.e14, c_e013, r.e1234, -c_e023, r.e34, -c_e014, r.e12, c_e024,
-                             r.s, c_e034, r.e23),
-                         mu.l13),
-          .l14 = mul_add(S(2),
-                         dot(-c_e012, r.e13, c_e013, r.e12, -c_e023, r.s, c_e014, r.e1234, -c_e024,
-                             r.e34, c_e034, r.e24),
-                         mu.l14),
-          .l23 = mul_add(S(2),
-                         dot(c_e012, r.e24, c_e013, r.e34, c_e023, r.e1234, -c_e014, r.s, -c_e024,
-                             r.e12, -c_e034, r.e13),
-                         mu.l23),
-          .l24 = mul_add(S(2),
-                         dot(-c_e012, r.e23, c_e013, r.s, c_e023, r.e12, c_e014, r.e34, c_e024,
-                             r.e1234, -c_e034, r.e14),
-                         mu.l24),
-          .l34 = mul_add(S(2),
-                         dot(-c_e012, r.s, -c_e013, r.e23, c_e023, r.e13, -c_e014, r.e24, c_e024,
-                             r.e14, c_e034, r.e1234),
-                         mu.l34)};
+  const S twice_e12 = S(2) * r.e12;
+  const S twice_e13 = S(2) * r.e13;
+  const S twice_e14 = S(2) * r.e14;
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e24 = S(2) * r.e24;
+  const S twice_e34 = S(2) * r.e34;
+  const S c_e012 =
+      dot(mu.l14, twice_e13, -mu.l13, twice_e14, mu.l24, twice_e23, -mu.l23, twice_e24);
+  const S c_e013 =
+      dot(-mu.l14, twice_e12, mu.l12, twice_e14, mu.l34, twice_e23, -mu.l23, twice_e34);
+  const S c_e023 =
+      dot(-mu.l24, twice_e12, -mu.l34, twice_e13, mu.l12, twice_e24, mu.l13, twice_e34);
+  const S c_e014 =
+      dot(mu.l13, twice_e12, -mu.l12, twice_e13, mu.l34, twice_e24, -mu.l24, twice_e34);
+  const S c_e024 =
+      dot(mu.l23, twice_e12, -mu.l34, twice_e14, -mu.l12, twice_e23, mu.l14, twice_e34);
+  const S c_e034 =
+      dot(mu.l23, twice_e13, mu.l24, twice_e14, -mu.l13, twice_e23, -mu.l14, twice_e24);
+  return {.l12 = dot(mu.l12, c_e012, r.e1234, -c_e013, r.e14, -c_e023, r.e24, c_e014, r.e13, c_e024,
+                     r.e23, -c_e034, r.s),
+          .l13 = dot(mu.l13, c_e012, r.e14, c_e013, r.e1234, -c_e023, r.e34, -c_e014, r.e12, c_e024,
+                     r.s, c_e034, r.e23),
+          .l14 = dot(mu.l14, -c_e012, r.e13, c_e013, r.e12, -c_e023, r.s, c_e014, r.e1234, -c_e024,
+                     r.e34, c_e034, r.e24),
+          .l23 = dot(mu.l23, c_e012, r.e24, c_e013, r.e34, c_e023, r.e1234, -c_e014, r.s, -c_e024,
+                     r.e12, -c_e034, r.e13),
+          .l24 = dot(mu.l24, -c_e012, r.e23, c_e013, r.s, c_e023, r.e12, c_e014, r.e34, c_e024,
+                     r.e1234, -c_e034, r.e14),
+          .l34 = dot(mu.l34, -c_e012, r.s, -c_e013, r.e23, c_e023, r.e13, -c_e014, r.e24, c_e024,
+                     r.e14, c_e034, r.e1234)};
 }
 
 /// pairing: Momentum Rate -> Scalar
@@ -161,7 +161,7 @@ template <class S>
 /// dexp: Rate Rate -> Rate
 /// Σ (−1)^k/(k+1)! ad_a^k b: the body rate of exp(a) where a changes at rate b.
 /// M = M0 exp(a) has ~M M' = dexp(a, a').
-/// Cost: 82 mul, 74 add (52 fused), 2 dexp_rotation.
+/// Cost: 82 mul, 74 add (46 fused), 2 dexp_rotation.
 template <class S>
 [[nodiscard]] constexpr so4::Rate<S> dexp(const so4::Rate<S>& a, const so4::Rate<S>& b) noexcept {
   const S bracket_w12 = dot(a.w13, b.w23, a.w14, b.w24, -a.w23, b.w13, -a.w24, b.w14);

@@ -301,36 +301,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Rotor<S>& r,
                                                             const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e30, r.e31, b.e20, r.e12, -b.e12, r.e20, b.e31, r.e30);
-  const S c_e02 = dot(b.e30, r.e23, -b.e10, r.e12, b.e12, r.e10, -b.e23, r.e30);
-  const S c_e12 = dot(b.e31, r.e23, -b.e23, r.e31, -b.e20, r.e10, b.e10, r.e20);
-  const S c_e03 = dot(-b.e20, r.e23, b.e10, r.e31, -b.e31, r.e10, b.e23, r.e20);
-  const S c_e13 = dot(b.e12, r.e23, -b.e23, r.e12, -b.e30, r.e10, b.e10, r.e30);
-  const S c_e23 = dot(b.e12, r.e31, -b.e31, r.e12, -b.e30, r.e20, b.e20, r.e30);
-  return {.e23 = mul_add(S(2),
-                         dot(c_e01, r.e0123, -c_e02, r.e30, c_e12, r.e31, c_e03, r.e20, c_e13,
-                             r.e12, c_e23, r.s),
-                         b.e23),
-          .e31 = mul_add(S(2),
-                         dot(c_e01, r.e30, c_e02, r.e0123, -c_e12, r.e23, -c_e03, r.e10, -c_e13,
-                             r.s, c_e23, r.e12),
-                         b.e31),
-          .e12 = mul_add(S(2),
-                         dot(-c_e01, r.e20, c_e02, r.e10, c_e12, r.s, c_e03, r.e0123, -c_e13, r.e23,
-                             -c_e23, r.e31),
-                         b.e12),
-          .e10 = mul_add(S(2),
-                         dot(-c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
-                             c_e23, r.e0123),
-                         b.e10),
-          .e20 = mul_add(S(2),
-                         dot(-c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
-                             r.e0123, c_e23, r.e30),
-                         b.e20),
-          .e30 = mul_add(S(2),
-                         dot(c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13,
-                             r.e10, -c_e23, r.e20),
-                         b.e30)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S twice_e10 = S(2) * r.e10;
+  const S twice_e20 = S(2) * r.e20;
+  const S twice_e30 = S(2) * r.e30;
+  const S c_e01 = dot(-b.e30, twice_e31, b.e20, twice_e12, -b.e12, twice_e20, b.e31, twice_e30);
+  const S c_e02 = dot(b.e30, twice_e23, -b.e10, twice_e12, b.e12, twice_e10, -b.e23, twice_e30);
+  const S c_e12 = dot(b.e31, twice_e23, -b.e23, twice_e31, -b.e20, twice_e10, b.e10, twice_e20);
+  const S c_e03 = dot(-b.e20, twice_e23, b.e10, twice_e31, -b.e31, twice_e10, b.e23, twice_e20);
+  const S c_e13 = dot(b.e12, twice_e23, -b.e23, twice_e12, -b.e30, twice_e10, b.e10, twice_e30);
+  const S c_e23 = dot(b.e12, twice_e31, -b.e31, twice_e12, -b.e30, twice_e20, b.e20, twice_e30);
+  return {.e23 = dot(b.e23, c_e01, r.e0123, -c_e02, r.e30, c_e12, r.e31, c_e03, r.e20, c_e13, r.e12,
+                     c_e23, r.s),
+          .e31 = dot(b.e31, c_e01, r.e30, c_e02, r.e0123, -c_e12, r.e23, -c_e03, r.e10, -c_e13, r.s,
+                     c_e23, r.e12),
+          .e12 = dot(b.e12, -c_e01, r.e20, c_e02, r.e10, c_e12, r.s, c_e03, r.e0123, -c_e13, r.e23,
+                     -c_e23, r.e31),
+          .e10 = dot(b.e10, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
+                     c_e23, r.e0123),
+          .e20 = dot(b.e20, -c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
+                     r.e0123, c_e23, r.e30),
+          .e30 = dot(b.e30, c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13, r.e10,
+                     -c_e23, r.e20)};
 }
 
 /// reverse: Rotor -> Rotor

@@ -48,26 +48,32 @@ template <class S>
 
 /// kinematics: Rotor Rate -> Rotor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 56 mul, 40 add (32 fused).  Sparsity: 48 of 48 pairs of components.
+/// Cost: 54 mul, 40 add (32 fused).  Sparsity: 48 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> kinematics(const Rotor<S>& r,
                                                            const so13::Rate<S>& w) noexcept {
-  return {.s = S(0.5) *
-               dot(r.e23, w.w23, r.e31, w.w31, r.e12, w.w12, r.e10, w.v1, r.e20, w.v2, r.e30, w.v3),
-          .e23 = S(0.5) * dot(-r.s, w.w23, -r.e31, w.w12, r.e12, w.w31, -r.e20, w.v3, r.e30, w.v2,
-                              -r.e0123, w.v1),
-          .e31 = S(0.5) * dot(-r.s, w.w31, r.e23, w.w12, -r.e12, w.w23, r.e10, w.v3, -r.e30, w.v1,
-                              -r.e0123, w.v2),
-          .e12 = S(0.5) * dot(-r.s, w.w12, -r.e23, w.w31, r.e31, w.w23, -r.e10, w.v2, r.e20, w.v1,
-                              -r.e0123, w.v3),
-          .e10 = S(0.5) * dot(r.s, w.v1, r.e31, w.v3, -r.e12, w.v2, -r.e20, w.w12, r.e30, w.w31,
-                              -r.e0123, w.w23),
-          .e20 = S(0.5) * dot(r.s, w.v2, -r.e23, w.v3, r.e12, w.v1, r.e10, w.w12, -r.e30, w.w23,
-                              -r.e0123, w.w31),
-          .e30 = S(0.5) * dot(r.s, w.v3, r.e23, w.v2, -r.e31, w.v1, -r.e10, w.w31, r.e20, w.w23,
-                              -r.e0123, w.w12),
-          .e0123 = S(0.5) * dot(-r.e23, w.v1, -r.e31, w.v2, -r.e12, w.v3, r.e10, w.w23, r.e20,
-                                w.w31, r.e30, w.w12)};
+  const S half_w23 = S(0.5) * w.w23;
+  const S half_w31 = S(0.5) * w.w31;
+  const S half_w12 = S(0.5) * w.w12;
+  const S half_v1 = S(0.5) * w.v1;
+  const S half_v2 = S(0.5) * w.v2;
+  const S half_v3 = S(0.5) * w.v3;
+  return {.s = dot(half_w23, r.e23, half_w31, r.e31, half_w12, r.e12, half_v1, r.e10, half_v2,
+                   r.e20, half_v3, r.e30),
+          .e23 = dot(-half_w23, r.s, -half_w12, r.e31, half_w31, r.e12, -half_v3, r.e20, half_v2,
+                     r.e30, -half_v1, r.e0123),
+          .e31 = dot(-half_w31, r.s, half_w12, r.e23, -half_w23, r.e12, half_v3, r.e10, -half_v1,
+                     r.e30, -half_v2, r.e0123),
+          .e12 = dot(-half_w12, r.s, -half_w31, r.e23, half_w23, r.e31, -half_v2, r.e10, half_v1,
+                     r.e20, -half_v3, r.e0123),
+          .e10 = dot(half_v1, r.s, half_v3, r.e31, -half_v2, r.e12, -half_w12, r.e20, half_w31,
+                     r.e30, -half_w23, r.e0123),
+          .e20 = dot(half_v2, r.s, -half_v3, r.e23, half_v1, r.e12, half_w12, r.e10, -half_w23,
+                     r.e30, -half_w31, r.e0123),
+          .e30 = dot(half_v3, r.s, half_v2, r.e23, -half_v1, r.e31, -half_w31, r.e10, half_w23,
+                     r.e20, -half_w12, r.e0123),
+          .e0123 = dot(-half_v1, r.e23, -half_v2, r.e31, -half_v3, r.e12, half_w23, r.e10, half_w31,
+                       r.e20, half_w12, r.e30)};
 }
 
 /// Ad: Rotor Rate -> Rate
@@ -77,36 +83,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so13::Rate<S> Ad(const Rotor<S>& r,
                                                         const so13::Rate<S>& w) noexcept {
-  const S c_e01 = dot(-r.e31, w.v3, r.e12, w.v2, r.e20, w.w12, -r.e30, w.w31);
-  const S c_e02 = dot(r.e23, w.v3, -r.e12, w.v1, -r.e10, w.w12, r.e30, w.w23);
-  const S c_e12 = dot(-r.e23, w.w31, r.e31, w.w23, -r.e10, w.v2, r.e20, w.v1);
-  const S c_e03 = dot(-r.e23, w.v2, r.e31, w.v1, r.e10, w.w31, -r.e20, w.w23);
-  const S c_e13 = dot(-r.e23, w.w12, r.e12, w.w23, -r.e10, w.v3, r.e30, w.v1);
-  const S c_e23 = dot(-r.e31, w.w12, r.e12, w.w31, -r.e20, w.v3, r.e30, w.v2);
-  return {.w23 = mul_add(S(2),
-                         dot(-c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
-                             r.e12, -c_e23, r.s),
-                         w.w23),
-          .w31 = mul_add(S(2),
-                         dot(-c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
-                             -c_e23, r.e12),
-                         w.w31),
-          .w12 = mul_add(S(2),
-                         dot(c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13,
-                             r.e23, c_e23, r.e31),
-                         w.w12),
-          .v1 = mul_add(S(2),
-                        dot(-c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
-                            c_e23, r.e0123),
-                        w.v1),
-          .v2 = mul_add(S(2),
-                        dot(-c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
-                            r.e0123, c_e23, r.e30),
-                        w.v2),
-          .v3 = mul_add(S(2),
-                        dot(c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13, r.e10,
-                            -c_e23, r.e20),
-                        w.v3)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S twice_e10 = S(2) * r.e10;
+  const S twice_e20 = S(2) * r.e20;
+  const S twice_e30 = S(2) * r.e30;
+  const S c_e01 = dot(-twice_e31, w.v3, twice_e12, w.v2, twice_e20, w.w12, -twice_e30, w.w31);
+  const S c_e02 = dot(twice_e23, w.v3, -twice_e12, w.v1, -twice_e10, w.w12, twice_e30, w.w23);
+  const S c_e12 = dot(-twice_e23, w.w31, twice_e31, w.w23, -twice_e10, w.v2, twice_e20, w.v1);
+  const S c_e03 = dot(-twice_e23, w.v2, twice_e31, w.v1, twice_e10, w.w31, -twice_e20, w.w23);
+  const S c_e13 = dot(-twice_e23, w.w12, twice_e12, w.w23, -twice_e10, w.v3, twice_e30, w.v1);
+  const S c_e23 = dot(-twice_e31, w.w12, twice_e12, w.w31, -twice_e20, w.v3, twice_e30, w.v2);
+  return {.w23 = dot(w.w23, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
+                     r.e12, -c_e23, r.s),
+          .w31 = dot(w.w31, -c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
+                     -c_e23, r.e12),
+          .w12 = dot(w.w12, c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13, r.e23,
+                     c_e23, r.e31),
+          .v1 = dot(w.v1, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
+                    c_e23, r.e0123),
+          .v2 = dot(w.v2, -c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13, r.e0123,
+                    c_e23, r.e30),
+          .v3 = dot(w.v3, c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13, r.e10,
+                    -c_e23, r.e20)};
 }
 
 /// Ad_star_inverse: Rotor Momentum -> Momentum
@@ -116,36 +116,30 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so13::Momentum<S> Ad_star_inverse(
     const Rotor<S>& r, const so13::Momentum<S>& mu) noexcept {
-  const S c_e01 = dot(-mu.l12, r.e31, mu.l31, r.e12, mu.p3, r.e20, -mu.p2, r.e30);
-  const S c_e02 = dot(mu.l12, r.e23, -mu.l23, r.e12, -mu.p3, r.e10, mu.p1, r.e30);
-  const S c_e12 = dot(-mu.p2, r.e23, mu.p1, r.e31, -mu.l31, r.e10, mu.l23, r.e20);
-  const S c_e03 = dot(-mu.l31, r.e23, mu.l23, r.e31, mu.p2, r.e10, -mu.p1, r.e20);
-  const S c_e13 = dot(-mu.p3, r.e23, mu.p1, r.e12, -mu.l12, r.e10, mu.l23, r.e30);
-  const S c_e23 = dot(-mu.p3, r.e31, mu.p2, r.e12, -mu.l12, r.e20, mu.l31, r.e30);
-  return {.l23 = mul_add(S(2),
-                         dot(-c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
-                             c_e23, r.e0123),
-                         mu.l23),
-          .l31 = mul_add(S(2),
-                         dot(-c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
-                             r.e0123, c_e23, r.e30),
-                         mu.l31),
-          .l12 = mul_add(S(2),
-                         dot(c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13,
-                             r.e10, -c_e23, r.e20),
-                         mu.l12),
-          .p1 = mul_add(S(2),
-                        dot(-c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
-                            r.e12, -c_e23, r.s),
-                        mu.p1),
-          .p2 = mul_add(S(2),
-                        dot(-c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
-                            -c_e23, r.e12),
-                        mu.p2),
-          .p3 = mul_add(S(2),
-                        dot(c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13, r.e23,
-                            c_e23, r.e31),
-                        mu.p3)};
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
+  const S twice_e10 = S(2) * r.e10;
+  const S twice_e20 = S(2) * r.e20;
+  const S twice_e30 = S(2) * r.e30;
+  const S c_e01 = dot(-mu.l12, twice_e31, mu.l31, twice_e12, mu.p3, twice_e20, -mu.p2, twice_e30);
+  const S c_e02 = dot(mu.l12, twice_e23, -mu.l23, twice_e12, -mu.p3, twice_e10, mu.p1, twice_e30);
+  const S c_e12 = dot(-mu.p2, twice_e23, mu.p1, twice_e31, -mu.l31, twice_e10, mu.l23, twice_e20);
+  const S c_e03 = dot(-mu.l31, twice_e23, mu.l23, twice_e31, mu.p2, twice_e10, -mu.p1, twice_e20);
+  const S c_e13 = dot(-mu.p3, twice_e23, mu.p1, twice_e12, -mu.l12, twice_e10, mu.l23, twice_e30);
+  const S c_e23 = dot(-mu.p3, twice_e31, mu.p2, twice_e12, -mu.l12, twice_e20, mu.l31, twice_e30);
+  return {.l23 = dot(mu.l23, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
+                     c_e23, r.e0123),
+          .l31 = dot(mu.l31, -c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
+                     r.e0123, c_e23, r.e30),
+          .l12 = dot(mu.l12, c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13,
+                     r.e10, -c_e23, r.e20),
+          .p1 = dot(mu.p1, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
+                    r.e12, -c_e23, r.s),
+          .p2 = dot(mu.p2, -c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
+                    -c_e23, r.e12),
+          .p3 = dot(mu.p3, c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13, r.e23,
+                    c_e23, r.e31)};
 }
 
 /// pairing: Momentum Rate -> Scalar
@@ -160,7 +154,7 @@ template <class S>
 /// dexp: Rate Rate -> Rate
 /// Σ (−1)^k/(k+1)! ad_a^k b: the body rate of exp(a) where a changes at rate b.
 /// M = M0 exp(a) has ~M M' = dexp(a, a').
-/// Cost: 82 mul, 67 add (54 fused), 1 dexp_complex.
+/// Cost: 82 mul, 67 add (48 fused), 1 dexp_complex.
 template <class S>
 [[nodiscard]] constexpr so13::Rate<S> dexp(const so13::Rate<S>& a,
                                            const so13::Rate<S>& b) noexcept {

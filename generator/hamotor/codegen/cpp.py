@@ -41,6 +41,7 @@ PAIRS = {
     "compensated_dot_parts",
     "double_word_sqrt",
     "double_word_sqrt_parts",
+    "double_word_product",
     "double_word_ratio",
     "double_word_reciprocal",
     "double_word_scaled",

@@ -8,7 +8,9 @@ does not mean what the algebra says cannot leave this module.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import partial
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import (
@@ -26,6 +28,7 @@ from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Expression,
     MultiplyAdd,
+    Name,
     Parameter,
     Product,
     Program,
@@ -134,7 +137,48 @@ def product_kernel(
         split = split_program(algebra, pair, product, operands, result, factor)
         if split is not None and split.cost.total < program.cost.total:
             program = split
+    for operand in (a, b):
+        scaled = _operand_scaled(operand, (a, b), meaning, result)
+        if scaled is not None and scaled.cost.total <= program.cost.total:
+            program = scaled
     return proved(Kernel(name, law, program, meaning, namespace, pairs))
+
+
+def _operand_scaled(
+    operand: Parameter,
+    parameters: tuple[Parameter, ...],
+    meaning: Mapping[str, Polynomial],
+    result: Element,
+) -> Program | None:
+    """The product with a power of two that all components share taken into an operand: exact, and
+    no component of the result waits for it.
+
+    None where they share none, or a term has no component of the operand.
+    """
+    sizes = {magnitude(poly.content(p)) for p in meaning.values() if p}
+    if len(sizes) != 1 or sizes == {1} or not _is_power_of_two(size := sizes.pop()):
+        return None
+    names, bindings = _multiples(value_of(operand), size)
+    if not all(any(x in names for x in m) for p in meaning.values() for m in p):
+        return None
+    values: dict[str, Polynomial] = {x: {(y,): ratio(1, size)} for x, y in names.items()}
+    outputs = {n: poly.substituted(p, values) for n, p in meaning.items()}
+    direct = direct_program(parameters, outputs, result)
+    return replace(direct, bindings=bindings).without_unused()
+
+
+def _is_power_of_two(x: Rational) -> bool:
+    return x > 0 and all(n & (n - 1) == 0 for n in (x.numerator, x.denominator))
+
+
+def _multiples(
+    value: PolynomialMultivector, factor: Rational
+) -> tuple[dict[str, str], tuple[tuple[str, Expression], ...]]:
+    """Names for the multiples of a value's components, by component, and what binds them."""
+    prefix = {2: "twice", Fraction(1, 2): "half"}.get(factor, "scaled")
+    components = dict.fromkeys(x for p in value.values() for monomial in p for x in monomial)
+    names = {x: f"{prefix}_{x.rpartition('.')[2]}" for x in components}
+    return names, tuple((y, Product(number(factor), Name(x))) for x, y in names.items())
 
 
 def linear_kernel(
@@ -250,18 +294,18 @@ def chain_kernel(
     """
     staging = Staging()
     (_, _, whole), *others = factors
-    partial = whole
+    so_far = whole
     for index, (product, parameter, value) in enumerate(others):
         whole = poly.apply_bilinear(product, whole, value)
-        partial = poly.apply_bilinear(product, partial, value)
+        so_far = poly.apply_bilinear(product, so_far, value)
         if index < len(others) - 1:
-            wanted = sorted(partial)
+            wanted = sorted(so_far)
             bound = {
-                b: staging.bind(f"{parameter.name}{index + 1}_{algebra.blade_name(b)}", partial[b])
+                b: staging.bind(f"{parameter.name}{index + 1}_{algebra.blade_name(b)}", so_far[b])
                 for b in wanted
             }
-            partial = {b: p for b, p in bound.items() if p}
-    outputs = tuple((n, polynomial_expression(p)) for n, p in read_off(partial, result).items())
+            so_far = {b: p for b, p in bound.items() if p}
+    outputs = tuple((n, polynomial_expression(p)) for n, p in read_off(so_far, result).items())
     program = Program(parameters, tuple(staging.bindings), outputs, result).without_unused()
     return proved(Kernel(name, law, program, read_off(whole, result)))
 
@@ -295,43 +339,49 @@ def sandwich_kernel(
     Where V ~V = 1, the change of X is a commutator with V.  It is sparse (what commutes with V
     drops out), so this costs far fewer operations than two products; for an even V its error is
     proportional to the displacement, not to X.  Of several forms that say the same the cheapest is
-    taken whose rounding errors are bounded by the terms of X + [V, X] ~V.  The unit condition
-    enters each exactly, as a multiple of 1 − V ~V, which the proof adds to the definition.
+    taken whose rounding errors are bounded by the terms of X + [V, X] ~V; of two that cost the same
+    the one with 2 V, which is known before X.  The unit condition enters each exactly, as a
+    multiple of 1 − V ~V, which the proof adds to the definition.
     """
     v, x = parameters_for(versor, operand)
     odd = any(g % 2 for g in versor.grades)
     overall = -1 if odd and operand.grades[0] % 2 else 1
     kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
-    forms = [
-        _commutator_first(algebra, (v, x), kind, sign)
+    makers: list[Callable[[bool], SandwichForm | None]] = [
+        partial(_commutator_first, algebra, (v, x), kind, sign)
         for kind, sign in (kinds if odd else kinds[:1])
     ]
-    last = None if odd else _commutator_last(algebra, (v, x))
-    if last is not None and _no_larger_terms(last, forms[0], result):
-        forms.append(last)
+    first = _commutator_first(algebra, (v, x), *kinds[0], doubled=False)
+    last = None if odd else _commutator_last(algebra, (v, x), doubled=False)
+    if last is not None and _no_larger_terms(last, first, result):
+        makers.append(partial(_commutator_last, algebra, (v, x)))
     kernels = [
-        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form) for form in forms
+        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form)
+        for doubled in (True, False)
+        for make in makers
+        if (form := make(doubled)) is not None
     ]
     return min(kernels, key=lambda kernel: kernel.program.cost.total)
 
 
 @dataclass(frozen=True)
 class SandwichForm:
-    """V X ~V = ±X + 2 `half` where V is a unit.
+    """V X ~V = ±X + `factor` `part` where V is a unit.
 
-    half:   over names that `staging` binds.
+    part:   over names that `staging` binds; half of the change, or all of it with 2 V in it.
     unit:   what is 1 where V is a unit: exactly, V X ~V + `sign` X (1 − unit) is computed.
     """
 
     note: str
     sign: int
     staging: Staging
-    half: PolynomialMultivector
+    factor: int
+    part: PolynomialMultivector
     unit: PolynomialMultivector
 
 
 def _sizes(form: SandwichForm, result: Element) -> Mapping[str, Polynomial]:
-    """`half` multiplied out, with the absolute values of all terms: what its rounding scales with.
+    """`part` multiplied out, with the absolute values of all terms: what its rounding scales with.
 
     A component of `result` is read off by absolute values, too.
     """
@@ -348,12 +398,12 @@ def _sizes(form: SandwichForm, result: Element) -> Mapping[str, Polynomial]:
 
     for name, p in form.staging.meaning.items():
         known[name] = expanded(p)
-    half = {blade: expanded(p) for blade, p in form.half.items()}
+    part = {blade: expanded(p) for blade, p in form.part.items()}
     sizes: dict[str, Polynomial] = {}
     for component, functional in zip(result.components, result.reading, strict=True):
         total = sizes.setdefault(component.name, {})
         for blade, x in functional.items():
-            poly.add_scaled(total, half.get(blade, {}), magnitude(x))
+            poly.add_scaled(total, part.get(blade, {}), magnitude(x))
     return sizes
 
 
@@ -381,25 +431,40 @@ def _bound(
     return {blade: p for blade, p in bound.items() if p}
 
 
+def _twice(
+    algebra: Algebra, versor: PolynomialMultivector, doubled: bool
+) -> tuple[PolynomialMultivector, Staging]:
+    """The versor, or its double over names that are bound, and where to bind what follows."""
+    translating = _translating(algebra, versor)
+    if not doubled:
+        return versor, Staging(translating)
+    names, bindings = _multiples(versor, 2)
+    staging = Staging(translating | {names[x] for x in translating})
+    staging.bindings += bindings
+    values: dict[str, Polynomial] = {x: {(y,): Fraction(1, 2)} for x, y in names.items()}
+    return {b: poly.scaled(poly.substituted(p, values), 2) for b, p in versor.items()}, staging
+
+
 def _commutator_first(
     algebra: Algebra,
     parameters: tuple[Parameter, Parameter],
     kind: Callable[[Blade, Blade], Multivector],
     sign: int,
+    doubled: bool,
 ) -> SandwichForm:
     """V X ~V = X + [V, X] ~V = −X + {V, X} ~V: the (anti)commutator is multiplied by ~V."""
     versor, value = (value_of(p) for p in parameters)
-    staging = Staging(_translating(algebra, versor))
-    moved = _bound(algebra, staging, "c", poly.apply_bilinear(kind, versor, value))
+    left, staging = _twice(algebra, versor, doubled)
+    moved = _bound(algebra, staging, "c", poly.apply_bilinear(kind, left, value))
     back = reversed_value(versor)
-    half = poly.apply_bilinear(algebra.geometric, moved, back)
+    part = poly.apply_bilinear(algebra.geometric, moved, back)
     unit = poly.apply_bilinear(algebra.geometric, versor, back)
     form = "X + 2 (M × X) ~M" if sign > 0 else "−X + 2 ½(M X + X M) ~M"
-    return SandwichForm(form, sign, staging, half, unit)
+    return SandwichForm(form, sign, staging, 1 if doubled else 2, part, unit)
 
 
 def _commutator_last(
-    algebra: Algebra, parameters: tuple[Parameter, Parameter]
+    algebra: Algebra, parameters: tuple[Parameter, Parameter], doubled: bool
 ) -> SandwichForm | None:
     """With V = R + D, D what contains the null vector e0 of a degenerate algebra, and Y = X ~R,
 
@@ -418,14 +483,16 @@ def _commutator_last(
     turning = {b: p for b, p in versor.items() if not b & mask}
     moving = {b: p for b, p in versor.items() if b & mask}
     back = reversed_value(turning)
-    staging = Staging(_translating(algebra, versor))
-    turned = _bound(algebra, staging, "y", poly.apply_bilinear(algebra.geometric, value, back))
-    half = poly.apply_bilinear(algebra.commutator, turning, turned)
+    twice, staging = _twice(algebra, versor, doubled)
+    right = reversed_value({b: p for b, p in twice.items() if not b & mask})
+    turned = _bound(algebra, staging, "y", poly.apply_bilinear(algebra.geometric, value, right))
+    part = poly.apply_bilinear(algebra.commutator, turning, turned)
     across = poly.apply_bilinear(algebra.geometric, moving, turned)
-    half = poly.added(half, {b: p for b, p in across.items() if reverse_sign(b) == sign})
+    part = poly.added(part, {b: p for b, p in across.items() if reverse_sign(b) == sign})
     unit = poly.apply_bilinear(algebra.geometric, back, turning)
     form = f"X + 2 (R × Y + <D Y>), Y = X ~R, {algebra.basis[null[0]]} in D = M − R" if null else ""
-    return SandwichForm(form if moving else "X + 2 R × (X ~R)", 1, staging, half, unit)
+    form = form if moving else "X + 2 R × (X ~R)"
+    return SandwichForm(form, 1, staging, 1 if doubled else 2, part, unit)
 
 
 def _sandwich(
@@ -439,22 +506,23 @@ def _sandwich(
     form: SandwichForm,
 ) -> Kernel:
     versor, value = (value_of(p) for p in parameters)
-    change = read_off(form.half, result)
+    change = read_off(form.part, result)
     still = read_off(value, result)
     outputs: list[tuple[str, Expression]] = []
     for component in result.components:
-        rest = poly.scaled(change[component.name], overall)
-        kept = polynomial_expression(poly.scaled(still[component.name], overall * form.sign))
-        if not rest:
-            outputs.append((component.name, kept))
-            continue
-        content = 2 * poly.content(rest)
-        inner = polynomial_expression(form.staging.in_order(poly.scaled(rest, ratio(2, content))))
-        factor = number(content)
-        if still[component.name]:
-            outputs.append((component.name, MultiplyAdd(factor, inner, kept)))
+        kept = poly.scaled(still[component.name], overall * form.sign)
+        rest = poly.scaled(change[component.name], overall * form.factor)
+        content = poly.content(rest) if rest else 1
+        inner = form.staging.in_order(poly.scaled(rest, ratio(1, content)))
+        total: Expression
+        if magnitude(content) == 1:
+            total = polynomial_expression(kept | poly.scaled(inner, content))
+        elif kept:
+            whole = polynomial_expression(inner)
+            total = MultiplyAdd(number(content), whole, polynomial_expression(kept))
         else:
-            outputs.append((component.name, Product(factor, inner)))
+            total = Product(number(content), polynomial_expression(inner))
+        outputs.append((component.name, total))
     bindings = tuple(form.staging.bindings)
     program = Program(parameters, bindings, tuple(outputs), result).without_unused()
 

@@ -107,10 +107,11 @@ def exp_kernel(
 def log_kernel(
     algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
 ) -> Kernel:
-    """Logarithm of a unit versor M = c + r + q + p by sin²θ = 1 − c²: a = θ / sin θ.
+    """Logarithm of a unit versor M = c + r + q + p by sin²θ = 1 − c²: a = θ / sin θ, θ = acos c.
 
     a r for the rotation part, a q + (a c − 1) p / sin²θ J(r) for the translation part.  For small
-    θ, a and the bracket are smooth functions of c, whose rounding does them no harm.
+    θ, a and the bracket are smooth functions of c, whose rounding does them no harm; nothing else
+    is needed for θ, so that acos and the root go side by side.
     """
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
@@ -124,16 +125,20 @@ def log_kernel(
         m[blade] = Name(name) if x > 0 else Negative(Name(name))
     cosine = m[0]
     writer = Writer()
-    square = writer.let("square", MultiplyAdd(negative(cosine), cosine, ONE))
-    sine = writer.let("sine", call("sqrt", square))
-    stretch = writer.let(
-        "stretch", Select(square, Quotient(call("atan2", sine, cosine), sine), ONE)
-    )
+    # acos knows c, not sin θ: where the processor does not fuse, this must be rounded once as well.
+    square = writer.let("square", call("fma", negative(cosine), cosine, ONE))
+    angle = call("acos", cosine)
+    if plane.pitch:
+        inverse = writer.let("inverse", Quotient(ONE, square))
+        ratio: Expression = Product(angle, call("sqrt", inverse))
+    else:
+        ratio = Quotient(angle, call("sqrt", square))
+    stretch = writer.let("stretch", Select(square, ratio, ONE))
     scaled = writer.let("scaled", _times(factor, stretch))
     r = {blade: m[blade] for blade in plane.rotation}
     out: dict[Blade, Expression] = {blade: Product(scaled, x) for blade, x in r.items()}
     if plane.pitch:
-        slope = Quotient(m[quadrivector(plane)], square)
+        slope = Product(m[quadrivector(plane)], inverse)
         rest = MultiplyAdd(stretch, cosine, number(-1))
         along = writer.let("along", Select(square, Product(_times(factor, rest), slope), ZERO))
         turned = axis_part(plane, r)

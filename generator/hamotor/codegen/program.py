@@ -177,10 +177,11 @@ class Program:
         found = Counter(
             node.function if isinstance(node, Call) else type(node) for node in self.nodes()
         )
+        exactly_fused = found.pop("fma", 0)
         calls = {kind: n for kind, n in found.items() if isinstance(kind, str)}
         if selects := found[Select]:
             calls["select"] = selects
-        both = found[MultiplyAdd]
+        both = found[MultiplyAdd] + exactly_fused
         split = sum(_split_sums(x) for _, x in (*self.bindings, *self.outputs))
         return Cost(
             mul=found[Product] + both,
@@ -270,8 +271,7 @@ def walk(expression: Expression) -> Iterator[Expression]:
 def _split_sums(expression: Expression, inside: bool = False) -> int:
     """How many sums `dot` adds to each other without fusing.
 
-    Chains of four products or more and of nothing else are two sums, of nine or more four (runtime,
-    scalar.hpp).
+    Chains of four products or more are two sums, of nine or more four (runtime, scalar.hpp).
     inside: the expression is the rest of a longer chain.
     """
     found = 0
@@ -281,8 +281,8 @@ def _split_sums(expression: Expression, inside: bool = False) -> int:
         while isinstance(rest, MultiplyAdd):
             products += 1
             rest = rest.c
-        if isinstance(rest, Product):
-            found = 3 if products >= 8 else int(products >= 3)
+        products += isinstance(rest, Product)
+        found = 3 if products >= 9 else int(products >= 4)
     for child in children(expression):
         in_chain = isinstance(expression, MultiplyAdd) and child is expression.c
         found += _split_sums(child, in_chain)

@@ -200,12 +200,6 @@ def _part(pair: Expression, part: str) -> Name:
     return Name(f"{pair.text}.{part}")
 
 
-def _double_word_product(a: Expression, b: Expression) -> tuple[Expression, ...]:
-    """Terms whose sum of products is a b, but for the product of the low words."""
-    (a_hi, a_lo), (b_hi, b_lo) = ((_part(x, "hi"), _part(x, "lo")) for x in (a, b))
-    return a_hi, b_hi, a_hi, b_lo, a_lo, b_hi
-
-
 def exp_kernel(
     algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
 ) -> Kernel:
@@ -322,11 +316,11 @@ def log_kernel(
     inverse = writer.let("inverse", call("double_word_reciprocal", squares))
     terms = [x for part, v in pitch_pairs(plane, r.values) for x in (part, q.values[v])]
     overlap = writer.let("overlap", call("compensated_dot_pair", *terms))
-    share = writer.let(
-        "share", call("compensated_dot_pair", *_double_word_product(overlap, inverse))
-    )
-    parts = [x for part in ("hi", "lo") for x in (cosine, _part(share, part))]
-    lengthwise = call("compensated_dot", *parts, q.values[quad], r.outward)
+    share = writer.let("share", call("double_word_product", overlap, inverse))
+    terms = [cosine, _part(share, "hi"), q.values[quad], r.outward]
+    pitch = writer.let("pitch", call("compensated_dot_parts", *terms))
+    low = MultiplyAdd(cosine, _part(share, "lo"), _part(pitch, "lo"))
+    lengthwise = Sum(_part(pitch, "hi"), low)
     square = Sum(_part(squares, "hi"), _part(squares, "lo"))
     sine2 = Product(square, r.outward), r.outward
     norm2 = writer.let("norm2", call("compensated_dot", cosine, cosine, *sine2))
@@ -336,8 +330,8 @@ def log_kernel(
     for blade, ((a, b), (c, d)) in _commutator(algebra, r.values, q_moved).items():
         name = algebra.blade_name(blade)
         exact = writer.let(f"moment_{name}", call("compensated_dot_pair", a, b, c, d))
-        product = call("compensated_dot", *_double_word_product(exact, inverse))
-        normal[blade] = writer.let(f"n_{name}", product)
+        product = writer.let(f"n_{name}", call("double_word_product", exact, inverse))
+        normal[blade] = _part(product, "hi")
     axis = axis_part(plane, r.values)
     double = _commutator(algebra, r.values, normal)
     # −T turns by π about the direction of its translation.
@@ -483,8 +477,10 @@ def normalize_kernel(algebra: Algebra, operand: Element, result: Element, where:
             slip = negative(writer.let("slip", Quotient(defect, square)))
             across = axis_part(plane, r.values) | {quad: r.values[0]}
             moved = {v: MultiplyAdd(slip, across[v], x) for v, x in moved.items()}
+        # What is known last is multiplied once.
+        factor = writer.let("factor", Product(inverse, root))
         for v, x in moved.items():
-            out[v] = Product(Product(Product(x, inverse), root), root)
+            out[v] = Product(Product(x, root), factor)
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
     law = "M (~M M)^(−1/2): the unit versor nearest to M"
     notes = ("Relative error at most 4 ulp of the result's norm, unless M has no rotor part.",)

@@ -161,17 +161,37 @@ template <class S, class... Rest>
   return dot_in_four(a * b, c * d, e * f, g * h, rest...);
 }
 
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_from(const S& x, const Rest&... rest) noexcept {
+  return dot_onto(x, rest...);
+}
+
+template <class S, class... Rest>
+  requires(sizeof...(Rest) >= 6 && sizeof...(Rest) <= 14)
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_from(const S& x, const S& a, const S& b,
+                                                  const Rest&... rest) noexcept {
+  return dot_in_turn(x, a * b, rest...);
+}
+
+template <class S, class... Rest>
+  requires(sizeof...(Rest) >= 12)
+[[nodiscard]] HAMOTOR_INLINE constexpr S dot_from(const S& x, const S& a, const S& b, const S& c,
+                                                  const S& d, const S& e, const S& f,
+                                                  const Rest&... rest) noexcept {
+  return dot_in_four(x, a * b, c * d, e * f, rest...);
+}
+
 }  // namespace detail
 
 /// a₁ b₁ + a₂ b₂ + … by multiply-adds in this order; from four products on, as two sums of every
 /// other product, a₁ b₁ + a₃ b₃ + … and a₂ b₂ + a₄ b₄ + …: half as many operations wait for each
 /// other, and a chain of motor products takes two thirds of the time.  From nine products on, as
 /// four sums, (1 + 2) + (3 + 4): no product of up to sixteen is rounded more than six times.
-/// With an odd number of arguments the first one is added, in one sum: c + a₁ b₁ + a₂ b₂ + ….
+/// With an odd number of arguments the first one is added, as if it were the first product.
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot(const S& x, const Rest&... rest) noexcept {
   if constexpr (sizeof...(Rest) % 2 == 0) {
-    return detail::dot_onto(x, rest...);
+    return detail::dot_from(x, rest...);
   } else {
     return detail::dot_of_products(x, rest...);
   }
@@ -509,6 +529,10 @@ template <class S>
                                     power_of_two<S>(-shrink / 2), power_of_two<S>(shrink / 2)};
     constexpr Scaling<S> from_small{power_of_two<S>(grow), power_of_two<S>(-grow),
                                     power_of_two<S>(grow / 2), power_of_two<S>(-grow / 2)};
+    // Not selects alone: by a branch that is foreseen a processor goes on as if none were scaled.
+    if (all(largest < large) && all(largest > small)) [[likely]] {
+      return {S(1), S(1), S(1), S(1)};
+    }
     const auto choose = [&](const S& if_large, const S& if_small) {
       return select(largest > large, if_large, select(largest < small, if_small, S(1)));
     };
@@ -624,6 +648,15 @@ template <class S>
     constexpr S largest = Limits<S>::max();
     return {select(hi > largest, largest, hi), x.lo * power};
   }
+}
+
+/// a b of double-word numbers, to about twice the working precision.
+template <class S>
+[[nodiscard]] constexpr DoubleWord<S> double_word_product(const DoubleWord<S>& a,
+                                                          const DoubleWord<S>& b) noexcept {
+  const S product = a.hi * b.hi;
+  const S rest = product_error(a.hi, b.hi, product) + mul_add(a.hi, b.lo, a.lo * b.hi);
+  return two_sum(product, rest);
 }
 
 /// 1 / x of a double-word number, to about twice the working precision.
