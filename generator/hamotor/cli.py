@@ -673,9 +673,14 @@ def _test(parsed: argparse.Namespace) -> int:
 def _bench(parsed: argparse.Namespace) -> int:
     if parsed.what not in (None, *_BENCHMARKS):
         raise UsageError(
-            f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)}.'
+            f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)};'
+            " scenes come after it, as in bench precision P1."
             f"{suggest(parsed.what, _BENCHMARKS)}"
         )
+    if parsed.drift is not None and parsed.what != "precision":
+        raise UsageError("--drift is for the long runs of bench precision.")
+    if parsed.with_peers and parsed.what in {"kernels", "steps", "stability"}:
+        raise UsageError(f"bench {parsed.what} has no peers to install; leave --with-peers out.")
     from hamotor.bench import (
         bench_ensemble,
         bench_kernels,

@@ -15,12 +15,13 @@ import numpy as np
 import pytest
 from tests.bench.precision import peers, stopwatch
 
-from hamotor.bench import endpoint, precision, readme, solvers
-from hamotor.bench.contest import Extent
+from hamotor.bench import endpoint, precision, problems, readme, solvers
+from hamotor.bench.account import Progress
+from hamotor.bench.contest import Extent, Row
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
-from hamotor.bench.precision_report import best, over_problems, table
+from hamotor.bench.precision_report import best, coverage, over_problems, table
 from hamotor.bench.problems import REFERENCES, Problem, Reference, own_problems, problem
 from hamotor.bench.summary import summary
 from hamotor.errors import UsageError
@@ -217,6 +218,82 @@ def test_the_readme_says_what_the_account_does() -> None:
     assert "Without the closed form the free body takes us 0.5 times as long" in text
     assert "splittings take 4 times as long as the fastest public solver" in text
     assert "Gauss collocation takes 3 to 15 times as long as the fastest of ours" in text
+
+
+def test_what_is_no_problem_is_told_the_benchmarks_own() -> None:
+    with pytest.raises(UsageError, match="benchmark's own problems are HVa, P1, .*P4"):
+        problem("P5")
+
+
+@pytest.mark.parametrize("name", own_problems())
+def test_a_reference_is_confirmed_by_other_methods_and_precisions(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def never(*_: Any) -> None:
+        pytest.fail("what is kept is of another scene: python -m hamotor.bench.witnesses")
+
+    monkeypatch.setattr(problems, "_end_of", never)
+    witnesses = problem(name).reference.witnesses
+    assert {w.method for w in witnesses} in ({"taylor", "gauss16"}, {"taylor", "closed_form"})
+    assert {"mpfr50", "quad"} <= {w.scalar for w in witnesses}
+    assert max(w.apart for w in witnesses) < 1e-25
+    assert next(w.apart for w in witnesses if w.scalar == "mpfr50") < 1e-32
+
+
+@pytest.mark.long
+def test_a_reference_is_confirmed_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(problems, "WITNESSES", tmp_path)
+    monkeypatch.setenv("HAMOTOR_CACHE", str(tmp_path))
+    assert max(w.apart for w in problem("HVa").reference.witnesses) < 1e-25
+
+
+def test_what_is_hopelessly_slow_is_not_repeated() -> None:
+    def row(who: str, family: str, error: float, us: float) -> Row:
+        return Row(
+            "p", who, family, "", "", "", "", "", "double", 0.0, "step",
+            best_us=us, errors={ATTITUDE: error},
+        )  # fmt: skip
+
+    rows = [
+        row("taylor", "hamotor", 1e-6, 10),
+        row("gauss8", "hamotor", 1e-6, 99),
+        row("gauss8", "hamotor", 1e-5, 101),
+        row("gauss8", "hamotor", 1e-7, 101),
+        row("closed_form", "hamotor", 1e-12, 1),
+        row("heyoka", "heyoka", 1e-6, 1000),
+        row("SciPy", "SciPy", 1e-6, 20_000),
+        row("rk4", "hamotor", 0.1, 1),
+        replace(row("rk4", "hamotor", 0.1, 1), failure="not finite"),
+    ]
+    assert precision.worth_repeating(rows, ATTITUDE) == [0, 1, 3, 4, 5]
+
+
+def test_what_there_is_is_counted_by_problem() -> None:
+    rows = [
+        {
+            "problem": "p", "family": "hamotor", "kernels": "generated", "representation": "ga",
+            "algebra": "pga3", "scalar": "double", "errors": {ATTITUDE: 1e-3}, "failure": None,
+            "best_us": 1.0, "cpu_us": 1.0, "steps": 1, "evaluations": 1, "operations": None,
+        }
+    ] * 2  # fmt: skip
+    account = {"problems": ["p", "q"], "rows": rows, "drift": []}
+    found = {(line["what"], line["value"]): line["rows"] for line in coverage(account)}
+    assert found["kernels", "generated"] == {"p": 2, "q": 0}
+    assert found["scalar", "quad"] == {"p": 0, "q": 0}
+    assert found["error", ATTITUDE]["p"] == found["cost", "steps"]["p"] == 2
+    assert found["cost", "operations"] == {"p": 0, "q": 0}
+
+
+def test_progress_says_how_long_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+    now = iter([0.0, 1.0, 20.0, 40.0])
+    progress = Progress("P1: compiling", 4, lambda: next(now))
+    progress.add()
+    progress.add()
+    progress.at(4)
+    assert capsys.readouterr().err.splitlines() == [
+        "P1: compiling",
+        "P1: compiling: 50%, about 20 s left",
+    ]
 
 
 def test_over_problems_the_worst_is_named() -> None:

@@ -302,6 +302,21 @@ def test_compare_exits_with_1_above_the_tolerance(
     assert "more than 1e-09" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("bench P1", "as in bench precision P1"),
+        ("bench --drift 5", "--drift is for"),
+        ("bench kernels --with-peers", "no peers to install"),
+    ],
+)
+def test_bench_says_what_does_not_belong_together(
+    words: str, said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words.split()) == 2
+    assert said in capsys.readouterr().err
+
+
 def test_test_runs_the_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
 

@@ -121,6 +121,15 @@ def test_a_principal_frame_diagonalises_to_sixty_digits() -> None:
     assert max(abs(a - decimal(b)) for a, b in zip(outside, point, strict=True)) < 1e-57
 
 
+def test_points_of_a_body_in_its_principal_frame_keep_their_digits() -> None:
+    scene = scene_of(
+        'algebra = "pga3"\n[[body]]\nname = "body"\nmass = 1.0\ninertia = [1.0, 2.0, 3.0]\n'
+    )
+    point = (written("0.1000000000000000055511151231257827"), 0.2, 0.3)
+    inside = scene.bodies[0].principal.from_body_frame(point)
+    assert decimal(inside[0]) == Fraction("0.1000000000000000055511151231257827")
+
+
 def test_a_symmetric_body_stays_symmetric_in_a_turned_frame() -> None:
     # Two equal moments: of 1 + 2 n nᵀ for n = (2, 3, 6)/7, in decimals that are not exact.
     n = np.array([2, 3, 6]) / 7

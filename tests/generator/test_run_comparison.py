@@ -50,6 +50,14 @@ def test_runs_with_other_steps_are_compared_where_their_times_meet() -> None:
     assert comparison.last_time == pytest.approx(9.0)
 
 
+def test_runs_back_in_time_are_compared_as_well() -> None:
+    comparison = compare(toy().run(step=0.02, end=-2.0), toy().run(step=0.01, end=-2.0))
+    assert comparison.times == 101
+    assert comparison.last_time == pytest.approx(-2.0)
+    with pytest.raises(UsageError, match="no recorded time"):
+        compare(toy().run(end=-2.0), toy().run(end=2.0))
+
+
 def test_runs_of_other_bodies_are_refused() -> None:
     run = toy().run()
     stranger = Run({**run.report, "final": {"bill": {}}}, trajectory=run.trajectory)

@@ -40,6 +40,26 @@ const std::map<std::string, Problem> problems = {
       9.81,
       0.5,
       0.02}},
+    {"P3b+",
+     {1,
+      {0.3, 0.3, 0.05},
+      {0.9999875000260416, 0.004999979166692708, 0, 0},
+      {0, 0, 49},
+      20,
+      1,
+      9.81,
+      0.5,
+      0.02}},
+    {"P3b-",
+     {1,
+      {0.3, 0.3, 0.05},
+      {0.9999875000260416, 0.004999979166692708, 0, 0},
+      {0, 0, 48},
+      20,
+      1,
+      9.81,
+      0.5,
+      0.02}},
 };
 
 class Series {
@@ -141,7 +161,7 @@ std::string list(const Values& values) {
 int main(int count, char** words) {
   const auto found = problems.find(count > 1 ? words[1] : "");
   if (found == problems.end()) {
-    std::cerr << "usage: taylor P1|P2|P3\n";
+    std::cerr << "usage: taylor P1|P2|P3|P3b+|P3b-\n";
     return 2;
   }
   const Problem& p = found->second;

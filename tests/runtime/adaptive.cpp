@@ -194,6 +194,14 @@ TEST(Rkmk54, estimates_an_error_of_fifth_order_in_the_step) {
   EXPECT_NEAR(std::log2(estimate(0.002L) / estimate(0.001L)), 5, 0.1);
 }
 
+TEST(ExponentialChart, an_error_of_the_exponent_is_what_it_does_to_the_motor) {
+  const auto m = generic_state(sample::forced_se3()).motors[0];
+  const hamotor::pga3::se3::Rate<double> x{1e-6, -2e-6, 3e-6, 5e-6, -4e-6, 2e-6};
+  const auto done = (gp(m, exp(x)) - m).components();
+  const auto said = hamotor::detail::ExponentialChart::error(m, x).components();
+  for (std::size_t k = 0; k < done.size(); ++k) EXPECT_NEAR(said[k], done[k], 1e-10);
+}
+
 template <class System>
 void expect_tolerance_met(const System& system) {
   const auto reference = stepped<Rkmk87>(system, 400);

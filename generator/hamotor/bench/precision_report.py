@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -24,8 +25,10 @@ there, against the reference: attitude, position, momentum and energy each in it
 are for the quantity that is named with the problem.
 Times are those of the whole integration on one core, the best of the runs, which are \
 interleaved over all contestants in one process; median and worst stand beside it, and the least \
-time that the thread had the processor. Set-up (generation, compilation, building a solver, the \
-first step) is not in them and listed apart.
+time that the thread had the processor. What takes more than ten times the least time to an error \
+as small (ours beside ours without closed forms, public solvers beside each other), or ends with \
+an error above 0.01, has only the few runs of a first look, as its row says. Set-up (generation, \
+compilation, building a solver, the first step) is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why; so is what takes more than a minute or \
 ends its process, of which nothing finer is tried. Settings go from coarse to fine until two in a \
@@ -34,8 +37,8 @@ Scenes and solvers in C++ are compiled with -O3 -march=native, those that lead b
 of which the faster counts.
 Evaluations are those of rates or forques, and of a Taylor series its order. Operations are \
 counted by a run with numbers that count, from the first 200 steps: generated, generic and \
-sparse kernels and conformal algebra in double; of other scalars, of matrices and of public \
-solvers nobody counts.
+sparse kernels and conformal algebra in double. Steps of explicit methods and splittings take as \
+many in any scalar; of others in other scalars, of matrices and of public solvers nobody counts.
 A scene in conformal algebra is a general one, with a whole gradient, as is one with generic \
 kernels (dense multivectors, by the whole table, or "sparse", by the part of it that the types of \
 the operands need): neither knows principal axes.
@@ -155,6 +158,48 @@ def over_problems(best: Rows) -> list[dict[str, Any]]:
             }
         )
     return found
+
+
+_MEASURED: Final = {
+    "kernels": ("generated", "sparse", "generic"),
+    "representation": ("ga", "matrix"),
+    "scalar": ("float", "double", "long_double", "quad"),
+    "algebra": (),
+    "family": (),
+}
+"""What rows differ in, with what should be there; none are those of any problem."""
+_COSTS: Final = {
+    "best_us": "time", "cpu_us": "processor time", "steps": "steps", "evaluations": "evaluations",
+    "operations": "operations",
+}  # fmt: skip
+
+
+def coverage(account: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """How many rows of each problem there are for everything that one can choose: kernels,
+    representations, algebras, scalars, solvers, errors and costs; and how many long runs."""
+    problems = account["problems"]
+    done: Rows = [row for row in account["rows"] if row["failure"] is None]
+
+    def line(what: str, value: str, rows: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
+        counts = Counter(row["problem"] for row in rows)
+        return {"what": what, "value": value, "rows": {p: counts[p] for p in problems}}
+
+    found = []
+    for axis, expected in _MEASURED.items():
+        ours = [r for r in done if axis == "family" or r["family"] == "hamotor"]
+        there = dict.fromkeys([*expected, *(r[axis] for r in ours if r[axis])])
+        found += [line(axis, value, (r for r in ours if r[axis] == value)) for value in there]
+    errors = dict.fromkeys(quantity for row in done for quantity in row["errors"])
+    found += [line("error", e, (r for r in done if e in r["errors"])) for e in errors]
+    found += [
+        line("cost", word, (r for r in done if r[key] is not None)) for key, word in _COSTS.items()
+    ]
+    runs = {(d["problem"], d["family"], d["contestant"]) for d in account["drift"]}
+    families = dict.fromkeys(family for _, family, _ in sorted(runs))
+    return found + [
+        line("long runs", family, ({"problem": p} for p, f, _ in runs if f == family))
+        for family in families
+    ]
 
 
 def _said(found: Best | None) -> dict[str, Any] | None:

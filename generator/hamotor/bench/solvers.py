@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import ctypes
 import json
+import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from queue import Empty, Queue
 from threading import Thread
@@ -88,24 +90,37 @@ def stopwatch(*arguments: str) -> subprocess.Popen[str]:
     return subprocess.Popen(
         (str(python), "-m", "tests.bench.precision.stopwatch", *arguments),
         cwd=ROOT,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
     )
 
 
-def timed(job: Mapping[str, Any], silent_s: float = SILENT_S) -> dict[tuple[int, int], Any]:
+At = tuple[int, int]
+"""A contestant (or long run) of a job and its setting."""
+Answers = dict[At, Any]
+
+
+def timed(
+    job: Mapping[str, Any],
+    silent_s: float = SILENT_S,
+    worth: Callable[[Answers], Iterable[At]] = lambda answers: answers,
+    progress: Callable[[int, int], None] | None = None,
+) -> Answers:
     """What the stopwatch says of a job, by contestant (or long run) and setting.
 
     What it was at when it had said nothing for `silent_s`, or ended, is a failure; the rest is
-    begun again without this contestant's finer settings.
+    begun again without this contestant's finer settings.  worth: which settings are to be repeated,
+    from a first look at each; all if not given.  progress: is told the round, 0 for the first
+    look, and the contestant.
     """
-    answers: dict[tuple[int, int], Any] = {}
+    answers: Answers = {}
     skipped: dict[int, int] = {}
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "job.json"
         while True:
             file.write_text(json.dumps({**job, "skipped": list(skipped.items())}), encoding="utf-8")
-            met = _timed_until(str(file), silent_s, answers)
+            met = _timed_until(str(file), silent_s, answers, worth, progress)
             if met is None:
                 return answers
             at, why = met
@@ -117,12 +132,17 @@ def timed(job: Mapping[str, Any], silent_s: float = SILENT_S) -> dict[tuple[int,
 
 
 def _timed_until(
-    file: str, silent_s: float, answers: dict[tuple[int, int], Any]
-) -> tuple[tuple[int, int] | None, str] | None:
+    file: str,
+    silent_s: float,
+    answers: Answers,
+    worth: Callable[[Answers], Iterable[At]],
+    progress: Callable[[int, int], None] | None,
+) -> tuple[At | None, str] | None:
     """Gather answers until the stopwatch is done, None, or had to be given up: at what, and why."""
     lines: Queue[str | None] = Queue()
-    at: tuple[int, int] | None = None
+    at: At | None = None
     why = ""
+    rounds = 0
     with stopwatch(file) as timing:
         stdout = timing.stdout
         assert stdout is not None
@@ -137,9 +157,19 @@ def _timed_until(
         try:
             while (line := lines.get(timeout=silent_s)) is not None:
                 said = json.loads(line)
-                at = int(said.pop("index")), int(said.pop("setting"))
-                if said:
-                    answers[at] = said
+                if "asks" in said:
+                    assert timing.stdin is not None
+                    with suppress(BrokenPipeError):  # it is seen to have ended
+                        chosen = json.dumps(list(worth(answers))) + "\n"
+                        os.write(timing.stdin.fileno(), chosen.encode())
+                elif "round" in said:
+                    rounds = said["round"]
+                else:
+                    at = int(said.pop("index")), int(said.pop("setting"))
+                    if said:
+                        answers[at] = said
+                    if progress is not None:
+                        progress(rounds, at[0])
             if timing.wait():
                 why = f"the process that times ended with {timing.returncode}"
         except Empty:

@@ -53,7 +53,7 @@ def compare(one: Run, other: Run) -> Comparison:
             f"{', '.join(other.bodies)}."
         )
     here, there = _common_times(one.t, other.t)
-    if not len(here) or (one.t[here[-1]] == 0 and max(one.t[-1], other.t[-1]) > 0):
+    if not len(here) or (one.t[here[-1]] == 0 and (one.t[-1] or other.t[-1])):
         raise UsageError(
             "the runs share no recorded time after the start; "
             "run both with the same step and every."
@@ -71,12 +71,14 @@ _KINDS = {"kg m^2/s": "angular momentum", "kg m/s": "linear momentum"}
 def _common_times(
     one: NDArray[np.float64], other: NDArray[np.float64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Indices of the times that are equal but for rounding."""
-    grid = _SAME_TIME * max(float(one[-1]), float(other[-1]), np.finfo(float).tiny)
-    nearest = np.clip(np.searchsorted(other, one), 1, max(len(other) - 1, 1))
-    nearest = np.minimum(nearest, len(other) - 1)
-    before = np.maximum(nearest - 1, 0)
-    nearest = np.where(np.abs(other[before] - one) < np.abs(other[nearest] - one), before, nearest)
+    """Indices of the times that are equal but for rounding; runs may go back in time."""
+    grid = _SAME_TIME * max(abs(float(one[-1])), abs(float(other[-1])), np.finfo(float).tiny)
+    order = np.argsort(other, kind="stable")
+    ascending = other[order]
+    after = np.minimum(np.searchsorted(ascending, one), len(other) - 1)
+    before = np.maximum(after - 1, 0)
+    closer_before = np.abs(ascending[before] - one) < np.abs(ascending[after] - one)
+    nearest = order[np.where(closer_before, before, after)]
     here = np.flatnonzero(np.abs(other[nearest] - one) <= grid)
     return here, nearest[here]
 

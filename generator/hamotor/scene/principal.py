@@ -64,7 +64,7 @@ class PrincipalFrame:
     def from_body_frame(self, point: Sequence[float]) -> Vector:
         """A point of the user's body frame, in the principal frame."""
         if self.is_body_frame:
-            return tuple(float(x) for x in point)
+            return tuple(point)
         relative = np.array(point, dtype=float) - np.array(self.center)
         exact = [decimal(x) - decimal(c) for x, c in zip(point, self.center, strict=True)]
         columns = zip(*self.exact_axes, strict=True)

@@ -88,7 +88,7 @@ struct ExponentialChart {
   /// An error of X as one of M.
   template <class Motor, class Rate>
   [[nodiscard]] static constexpr Motor error(const Motor& m, const Rate& x) noexcept {
-    return typename Motor::Scalar(0.5) * kinematics(m, x);
+    return kinematics(m, x);
   }
 };
 

@@ -1,9 +1,10 @@
 """Times contestants in one process: `-m tests.bench.precision.stopwatch JOB` writes rows of JSON.
 
-A contestant is a list of settings from coarse to fine.  Each setting runs once, until two in a row
-take longer than the contestant may; then rounds go over all contestants of a problem, so that what
-else runs on the machine disturbs all alike.  Runs in the peers' environment and needs nothing of
-Hamotor.
+A contestant is a list of settings from coarse to fine.  Each setting runs once or, if short, three
+times, until two in a row
+take longer than the contestant may; who asked is told how each ended, and answers with those that
+are worth more; then rounds go over these of all contestants, so that what else runs on the machine
+disturbs all alike.  Runs in the peers' environment and needs nothing of Hamotor.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from math import isfinite
 from pathlib import Path
 from statistics import median
@@ -24,6 +25,10 @@ from tests.bench.precision import peers
 _BATCH_S = 3e-4
 """Shorter runs are repeated until they take this long."""
 _LARGEST_BATCH = 10
+_SHORT_S = 1e-3
+
+Worth = Callable[[], Iterable[tuple[int, int]]]
+"""Contestants and settings that are worth more than one run."""
 
 
 class CompiledScene:
@@ -96,8 +101,11 @@ class Entry:
         }
 
 
-def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """What each setting gave, and what failed; before each, which comes."""
+def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
+    """What each setting gave, and what failed; before each, which comes.
+
+    After a first look at each: `{"asks": true}`, and `worth` says which are to be repeated.
+    """
     problem = peers.Problem(job["problem"]) if job["problem"] else None
     skipped = dict(job.get("skipped", ()))
     entries = []
@@ -109,8 +117,10 @@ def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             try:
                 entry = Entry(at, _timed(job, contestant, setting, problem))
                 entry.run()
-                if min(entry.seconds) > contestant["longest_s"]:
+                if 1 < min(entry.seconds) / contestant["longest_s"] < 2:
                     entry.run()  # it may have been disturbed
+                while len(entry.seconds) < 3 and sum(entry.seconds) < _SHORT_S:
+                    entry.run()
             except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
                 yield {**at, "failure": str(problem_met)}
                 continue
@@ -118,12 +128,20 @@ def rows(job: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
             slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
             if slow == 2:
                 break
-    for _ in range(job.get("rounds", 0)):
-        for entry in entries:
+    for entry in entries:
+        yield entry.row()
+    repeated = []
+    if job.get("rounds", 0):
+        yield {"asks": True}
+        chosen = set(worth())
+        repeated = [e for e in entries if (e.at["index"], e.at["setting"]) in chosen]
+    for number in range(job.get("rounds", 0)):
+        yield {"round": number + 1}
+        for entry in repeated:
             if len(entry.seconds) < 3 or sum(entry.seconds) < job["enough_s"]:
                 yield entry.at
                 entry.run()
-    for entry in entries:
+    for entry in repeated:
         yield entry.row()
     for index, asked in enumerate(job.get("long_runs", ())):
         at = {"index": index, "setting": 0}
@@ -178,8 +196,13 @@ def main() -> None:
     # Some peers greet on the standard output, which is for rows.
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as answers:
         os.dup2(2, 1)
-        for row in rows(job):
+        for row in rows(job, _told):
             print(json.dumps(row), file=answers, flush=True)
+
+
+def _told() -> Iterable[tuple[int, int]]:
+    """What a line of the standard input says."""
+    return [(index, setting) for index, setting in json.loads(sys.stdin.readline())]
 
 
 if __name__ == "__main__":
