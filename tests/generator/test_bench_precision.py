@@ -221,7 +221,7 @@ def test_the_readme_says_what_the_account_does() -> None:
 
 
 def test_what_is_no_problem_is_told_the_benchmarks_own() -> None:
-    with pytest.raises(UsageError, match="benchmark's own problems are HVa, P1, .*P4"):
+    with pytest.raises(UsageError, match=r"benchmark's own problems are HVa, P1, .*P4"):
         problem("P5")
 
 
