@@ -38,6 +38,7 @@ from hamotor.codegen.spec import AlgebraSpec, bundled_path, read_algebra
 ROOT = Path(__file__).resolve().parents[2]
 BUILDS = ROOT / ".hamotor" / "build" / "ulp"
 MEASURE = Path(__file__).with_name("conditioned.hpp")
+RANDOM = MEASURE.with_name("random.hpp")
 ALGEBRAS = tuple(bundled_algebras())
 SCALARS = ("double", "float")
 
@@ -289,7 +290,7 @@ def program(algebra: str, *, fused: bool, points: int) -> Path:
     flags = ["-std=gnu++20", level, "-ffp-contract=off", *(["-mfma"] if fused else [])]
     text = source(algebra)
     identity = hashlib.sha256((" ".join(flags) + text).encode())
-    headers = [MEASURE, *(ROOT / "runtime" / "include" / "hamotor").glob("*.hpp")]
+    headers = [MEASURE, RANDOM, *(ROOT / "runtime" / "include" / "hamotor").glob("*.hpp")]
     headers += (ROOT / "generated" / "hamotor" / algebra).glob("*.hpp")
     for path in sorted(headers):
         identity.update(path.read_bytes())

@@ -28,27 +28,13 @@
 #include "hamotor/pga3/pga3.hpp"
 #include "hamotor/pga4/pga4.hpp"
 #include "hamotor/sta/sta.hpp"
+#include "random.hpp"
 
 namespace {
 
 __extension__ using Quad = __float128;
 
-struct Random {
-  std::uint64_t state;
-
-  std::uint64_t bits() {
-    std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  double symmetric() { return 2 * uniform() - 1; }
-  double power_of_ten(double low, double high) {
-    return std::pow(10.0, low + (high - low) * uniform());
-  }
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(bits() % n); }
-};
+using reference::Random;
 
 constexpr double pi = 3.141592653589793;
 

@@ -20,31 +20,19 @@
 #include <vector>
 
 #include "hamotor/angle_increment.hpp"
+#include "random.hpp"
 
 namespace {
 
 __extension__ using Quad = __float128;
 
-struct Random {
-  std::uint64_t state;
-
-  std::uint64_t bits() {
-    std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  double between(double low, double high) { return low + (high - low) * uniform(); }
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(bits() % n); }
-  double sign() { return bits() % 2 == 0 ? 1 : -1; }
-};
+using reference::Random;
 
 /// A number of any exponent between two, of either sign.
 template <class T>
 T of_size(Random& random, double low, double high) {
   const double exponent = std::floor(random.between(low, high));
-  return static_cast<T>(random.sign() *
+  return static_cast<T>(-random.sign() *
                         std::ldexp(1 + random.uniform(), static_cast<int>(exponent)));
 }
 
@@ -53,7 +41,7 @@ template <class T>
 T beside(Random& random, Quad x) {
   T result = static_cast<T>(x);
   for (std::size_t n = random.below(4); n > 0; --n) {
-    result = std::nextafter(result, static_cast<T>(random.sign()) * std::numeric_limits<T>::max());
+    result = std::nextafter(result, static_cast<T>(-random.sign()) * std::numeric_limits<T>::max());
   }
   return result;
 }
@@ -75,7 +63,7 @@ T some_angle(Random& random) {
     case 3:
       return beside<T>(random, std::floor(50 * random.uniform()) * pi / 4);
     case 4:
-      return beside<T>(random, random.sign() * far_angle);
+      return beside<T>(random, -random.sign() * far_angle);
     case 5:
       return static_cast<T>(random.between(-far_angle, far_angle));
     default:
@@ -120,7 +108,7 @@ template <class T>
 T some_sine(Random& random) {
   const T x =
       random.below(3) == 0
-          ? beside<T>(random, random.sign() * (1 - std::abs(of_size<double>(random, -50, -1))))
+          ? beside<T>(random, -random.sign() * (1 - std::abs(of_size<double>(random, -50, -1))))
       : random.below(2) == 0 ? of_size<T>(random, -140, -1)
                              : static_cast<T>(random.between(-1, 1));
   return std::clamp(x, T(-1), T(1));

@@ -10,6 +10,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 BUILDS = ROOT / ".hamotor" / "build"
+HEADERS = ("generated", "runtime/include", "tests/reference")
 
 
 def processor_can_fuse() -> bool:
@@ -24,7 +25,7 @@ def program(source: Path, *, fused: bool) -> Path:
     native = ["-mfma"] if fused and platform.machine() == "x86_64" else []
     flags = ["-std=gnu++20", "-O2", "-ffp-contract=off", *native]
     identity = hashlib.sha256(" ".join(flags).encode())
-    headers = [p for f in ("generated", "runtime/include") for p in (ROOT / f).rglob("*.hpp")]
+    headers = [p for f in HEADERS for p in (ROOT / f).rglob("*.hpp")]
     for path in (source, *sorted(headers)):
         identity.update(path.read_bytes())
     folder = BUILDS / source.stem

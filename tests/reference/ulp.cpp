@@ -25,6 +25,7 @@
 
 #include "hamotor/pga2/pga2.hpp"
 #include "hamotor/pga3/pga3.hpp"
+#include "random.hpp"
 
 namespace {
 
@@ -144,23 +145,12 @@ Even<Quad> cayley_inverse_reference(const Even<Quad>& m) {
 
 // ---------------------------------------------------------------- inputs
 
-struct Random {
-  std::uint64_t state;
-
-  std::uint64_t bits() {
-    std::uint64_t z = (state += 0x9e3779b97f4a7c15u);
-    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-    return z ^ (z >> 31);
-  }
-  double uniform() { return static_cast<double>(bits() >> 11) * 0x1p-53; }
-  double symmetric() { return 2 * uniform() - 1; }
+struct Random : reference::Random {
   Quad power_of_ten(double low, double high) {
-    const double exponent = low + (high - low) * uniform();
+    const double exponent = between(low, high);
     const double whole = std::floor(exponent * 3.3219280948873623);
     return ldexpq(std::exp2(exponent * 3.3219280948873623 - whole), static_cast<int>(whole));
   }
-  std::size_t below(std::size_t n) { return static_cast<std::size_t>(bits() % n); }
 };
 
 template <class S>
@@ -655,7 +645,7 @@ template <class S>
 void measure(const char* scalar, std::size_t count, const std::string& only) {
   for (const Function<S>& f : functions<S>()) {
     if (!only.empty() && f.name != only) continue;
-    Random random{std::hash<std::string>{}(f.name + f.form)};
+    Random random{{std::hash<std::string>{}(f.name + f.form)}};
     std::vector<double> errors;
     Even<S> worst{};
     double largest = -1;
@@ -713,7 +703,7 @@ template <class S>
 void sample(const char* scalar, std::size_t count, const std::string& only) {
   for (const Function<S>& f : functions<S>()) {
     if (!only.empty() && f.name != only) continue;
-    Random random{std::hash<std::string>{}(f.name + f.form)};
+    Random random{{std::hash<std::string>{}(f.name + f.form)}};
     for (std::size_t i = 0; i < count; ++i) {
       const Even<Quad> x = exact(f.input(random, f.space));
       std::printf(

@@ -1,10 +1,9 @@
-// Canonical coordinates (ξ, p) on T*G about a motor M̂: M = M̂ exp ξ, p = dexp_−ξ^T m, m the momentum
-// seen from M̂, that is m = Ad*⁻¹_{exp ξ} μ.
+// Canonical coordinates (ξ, p) on T*G about a motor M̂: M = M̂ exp ξ, or M̂ exp x exp θ where ξ is a
+// translation x and a turn θ, and p the momentum that ξ̇ is paired with.  m is the body's momentum
+// turned back to the frame of M̂.
 //
-// Everything here is a function of ad_ξ or of its transpose A = ad*_ξ.  Where θ²(ξ) = Σ w_k ξ_k²
-// makes ad³ = −θ² ad (rotations, rigid motions of the plane) or ad (ad² + θ²)² = 0 (rigid motions
-// of space), it is a polynomial of degree 2 or 4, whose coefficients are interpolated at ad² = −θ²,
-// there with their slopes.  All other groups take series.
+// Where turns obey ad³ = −θ² ad, θ²(ξ) = Σ w_k ξ_k², everything is a polynomial of degree 2 in
+// ad_θ or in its transpose.  All other groups take series.
 #pragma once
 
 #include <array>
@@ -82,17 +81,28 @@ template <class T, class Map>
   return sum;
 }
 
-/// θ² of a group and how often the factor ad² + θ² is in ad's minimal polynomial; 0 times where
-/// there is no such θ².
+/// θ² of a group of turns and translations; nothing turns or all is turned by what turns.
 template <std::size_t n>
-struct AdjointPolynomial {
-  std::array<int, n> weights{};  ///< θ² = Σ w_k ξ_k²
-  int factors = 0;
+struct TurningPart {
+  std::array<int, n> weights{};  ///< θ² = Σ w_k ξ_k², 0 for a translation
+  bool is_all = false;           ///< whether the group is that
+  bool has_translations = false;
+
+  /// ξ without translations, or nothing but these.
+  template <bool turns, class T>
+  [[nodiscard]] constexpr T part(const T& xi) const noexcept {
+    auto x = xi.components();
+    for (std::size_t k = 0; k < n; ++k) {
+      if ((weights[k] != 0) != turns) x[k] = typename T::Scalar(0);
+    }
+    return T::from(x);
+  }
 };
 
-/// Asked of the group's `ad` in integers: θ² from the trace of ad², then the identity itself.
+/// Asked of the group's `ad` in integers: θ² from the trace of ad², then that translations are an
+/// abelian ideal, turns a subalgebra, and ad³ = −θ² ad for these.
 template <class G>
-[[nodiscard]] constexpr auto adjoint_polynomial() noexcept {
+[[nodiscard]] constexpr auto turning_part() noexcept {
   using S = long double;  // of which no kernel has another form
   using Rate = typename G::template Rate<S>;
   constexpr auto n = static_cast<std::size_t>(G::dimension);
@@ -101,20 +111,23 @@ template <class G>
     x[k] = 1;
     return Rate::from(x);
   };
-  AdjointPolynomial<n> found{};
-  for (int factors = 1; factors <= 2; ++factors) {
-    bool is_sum_of_squares = true;
+  // ad turns the translations of space as it turns the turns: θ² counts twice in the trace.
+  for (const int times : {1, 2}) {
+    TurningPart<n> found{};
+    found.is_all = true;
     for (std::size_t a = 0; a < n; ++a) {
       S trace = 0;
       for (std::size_t c = 0; c < n; ++c)
         trace += ad(unit(a), ad(unit(a), unit(c))).components()[c];
-      found.weights[a] = static_cast<int>(trace) / (-2 * factors);
-      if (trace > 0 || static_cast<S>(found.weights[a] * -2 * factors) != trace) {
-        is_sum_of_squares = false;
+      found.weights[a] = static_cast<int>(trace) / (-2 * times);
+      found.has_translations = found.has_translations || found.weights[a] == 0;
+      if (trace > 0 || static_cast<S>(found.weights[a] * -2 * times) != trace) {
+        found.is_all = false;
       }
     }
-    if (!is_sum_of_squares) continue;
-    bool holds = true;
+    const auto is_none = [&](const Rate& x) {
+      for (const auto& c : x.components()) found.is_all = found.is_all && !(c > 0 || c < 0);
+    };
     int number = 5;
     const auto next = [&] {
       std::array<S, n> x{};
@@ -122,47 +135,49 @@ template <class G>
         number = (number * 13 + 7) % 31;
         c = static_cast<S>(number - 15);
       }
-      return x;
+      return Rate::from(x);
     };
     for (std::size_t trial = 0; trial < n; ++trial) {
-      const auto x = next();
-      const Rate xi = Rate::from(x);
+      const Rate x = next();
+      const Rate turn = found.template part<true>(x);
+      const Rate shift = found.template part<false>(x);
       S t = 0;
-      for (std::size_t k = 0; k < n; ++k) t += static_cast<S>(found.weights[k]) * x[k] * x[k];
-      Rate y = ad(xi, Rate::from(next()));
-      for (int k = 0; k < factors; ++k) y = ad(xi, ad(xi, y)) + t * y;
-      for (const auto& c : y.components()) holds = holds && !(c > 0 || c < 0);
+      for (std::size_t k = 0; k < n; ++k) {
+        t += static_cast<S>(found.weights[k]) * x.components()[k] * x.components()[k];
+      }
+      const Rate y = next();
+      const Rate once = ad(turn, y);
+      is_none(ad(turn, ad(turn, once)) + t * once);
+      is_none(found.template part<false>(ad(turn, found.template part<true>(y))));
+      is_none(found.template part<true>(ad(shift, y)));
+      is_none(ad(shift, found.template part<false>(y)));
     }
-    if (holds) {
-      found.factors = factors;
-      return found;
-    }
+    if (found.is_all) return found;
   }
-  return found;
+  return TurningPart<n>{};
 }
 
-/// `adjoint_polynomial` where the compiler can evaluate the group's `ad`.
+/// `turning_part` where the compiler can evaluate the group's `ad`.
 template <class G>
-struct AdjointPolynomialOf {
-  static constexpr AdjointPolynomial<static_cast<std::size_t>(G::dimension)> value{};
+struct TurningPartOf {
+  static constexpr TurningPart<static_cast<std::size_t>(G::dimension)> value{};
 };
 template <class G>
-  requires requires { typename std::bool_constant<(adjoint_polynomial<G>().factors >= 0)>; }
-struct AdjointPolynomialOf<G> {
-  static constexpr auto value = adjoint_polynomial<G>();
+  requires requires { typename std::bool_constant<turning_part<G>().is_all>; }
+struct TurningPartOf<G> {
+  static constexpr auto value = turning_part<G>();
 };
 
-/// For h² = t/4: s = sin h / h, k = cos h, and the derivatives s' = −d/2, d' = −e, e' = −f by t.
+/// For h² = t/4: s = sin h / h, k = cos h, and the derivatives s' = −d/2, d' = −e by t.
 template <class S>
 struct TurningFunctions {
   S s;
   S k;
   S d;
   S e;
-  S f;
 };
 
-/// e and f as power series, good for 0 ≤ t < 16.
+/// e and f = −e' as power series, good for 0 ≤ t < 16.
 template <class S>
 struct TurningSeries {
   static constexpr std::size_t terms = [] {
@@ -202,38 +217,41 @@ template <class S>
     }
     const S d = mul_add(S(-16) * t, f, S(40) * e);
     const S s = mul_add(S(-8) * t, e, S(12) * d);
-    return {s, mul_add(-t, d, s), d, e, f};
+    return {s, mul_add(-t, d, s), d, e};
   }
   const S h = S(0.5) * scalar::sqrt(t);
   const S s = scalar::sin(h) / h;
   const S k = scalar::cos(h);
   const S d = (s - k) / t;
   const S e = mul_add(S(1.5), d, S(-0.125) * s) / t;
-  const S f = mul_add(S(2.5), e, S(-0.0625) * d) / t;
-  return {s, k, d, e, f};
+  return {s, k, d, e};
 }
 
 }  // namespace detail
 
 /// The coordinates at one ξ, for any group.
-template <class G, class S, int factors = detail::AdjointPolynomialOf<G>::value.factors>
+///
+/// Where translations are apart they are made first, M = M̂ exp x exp θ, and m is seen from where
+/// the body is, in the frame of M̂: place and P, turn and spin are coordinates of their own, and no
+/// spin is the difference of moments of P about another place, many radii of gyration away.
+template <class G, class S, bool closed = detail::TurningPartOf<G>::value.is_all>
 class CanonicalChart {
+  using Element = typename G::template Element<S>;
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
-  static constexpr auto polynomial = detail::AdjointPolynomialOf<G>::value;
+  static constexpr auto group = detail::TurningPartOf<G>::value;
   static constexpr auto dimension = static_cast<std::size_t>(G::dimension);
 
  public:
+  /// Whether translations are apart.
+  static constexpr bool translates = group.has_translations;
+
   CanonicalChart() noexcept : CanonicalChart(Rate{}) {}
   [[gnu::flatten]] explicit CanonicalChart(const Rate& xi) noexcept : xi_(xi), t_(product(xi, xi)) {
     f_ = detail::turning_functions(t_);
     half_square_ = S(0.5) * f_.s * f_.s;
-    half_slope_ = S(0.5) * f_.s * f_.d;
     square_ = mul_add(S(-1) * f_.k, f_.d, S(0.5) * half_square_);
-    square_slope_ = mul_add(S(0.125) * f_.s, f_.d, S(-1) * f_.k * f_.e);
-    const S inverse = S(1) / f_.s;
-    inverse_square_ = f_.d * inverse;
-    inverse_slope_ = mul_add(S(-0.5) * inverse_square_, inverse_square_, f_.e * inverse);
+    inverse_square_ = f_.d / f_.s;
   }
 
   [[nodiscard]] const Rate& xi() const noexcept { return xi_; }
@@ -245,81 +263,108 @@ class CanonicalChart {
     return other;
   }
 
-  /// ξ̇ = dexp_ξ⁻¹ B for the body rate B; not finite at rotations by 2π.
+  /// M̂~M.
+  [[nodiscard, gnu::flatten]] Element element() const noexcept {
+    if constexpr (translates) {
+      const Rate one = ad(turn(), shift());
+      return exp(mul_add(inverse_square_, ad(turn(), one), mul_add(S(-0.5), one, xi_)));
+    } else {
+      return exp(xi_);
+    }
+  }
+
+  /// X with M = M₀ exp X for the motor M₀ at −ξ.
+  [[nodiscard, gnu::flatten]] Rate whole_logarithm() const noexcept {
+    Rate half = xi_;
+    if constexpr (translates) {
+      half = mul_add(-square_ / (f_.s * f_.k), ad(turn(), ad(turn(), shift())), half);
+    }
+    return S(2) * half;
+  }
+
+  /// ξ̇ for the body rate B; not finite at rotations by 2π.
   [[nodiscard, gnu::flatten]] Rate rate(const Rate& b) const noexcept {
-    return applied(
-        b, [&](const Rate& y) { return ad(xi_, y); }, S(0.5), S(0), inverse_square_,
-        inverse_slope_);
+    const Rate one = ad(turn(), b);
+    const Rate two = ad(turn(), one);
+    return joined(polynomial(b, one, two, S(0.5), inverse_square_),
+                  polynomial(b, one, two, f_.s * f_.k, half_square_));
   }
 
-  /// B = dexp_ξ ξ̇.
+  /// B for ξ̇.
   [[nodiscard, gnu::flatten]] Rate body_rate(const Rate& v) const noexcept {
-    return applied(
-        v, [&](const Rate& y) { return ad(xi_, y); }, -half_square_, -half_slope_, square_,
-        square_slope_);
+    const Rate one = ad(turn(), v);
+    const Rate two = ad(turn(), one);
+    return joined(polynomial(v, one, two, -half_square_, square_),
+                  polynomial(v, one, two, -f_.s * f_.k, half_square_));
   }
 
-  /// p for the momentum m seen from M̂.
+  /// p for m.
   [[nodiscard, gnu::flatten]] Momentum momentum(const Momentum& m) const noexcept {
-    return applied(m, turn(), half_square_, half_slope_, square_, square_slope_);
+    const Momentum one = coadjoint(turn(), m);
+    return joined(polynomial(m, one, coadjoint(turn(), one), half_square_, square_), m);
   }
 
   /// m for p.
   [[nodiscard, gnu::flatten]] Momentum seen_from_center(const Momentum& p) const noexcept {
-    return applied(p, turn(), S(-0.5), S(0), inverse_square_, inverse_slope_);
+    const Momentum one = coadjoint(turn(), p);
+    return joined(polynomial(p, one, coadjoint(turn(), one), S(-0.5), inverse_square_), p);
   }
 
-  /// The body's momentum Ad*_{exp ξ} m.
+  /// The body's momentum.
   [[nodiscard, gnu::flatten]] Momentum body_momentum(const Momentum& m) const noexcept {
-    return applied(m, turn(), f_.s * f_.k, mul_add(S(0.5) * f_.d, f_.k, S(0.125) * f_.s * f_.s),
-                   half_square_, half_slope_);
+    const Momentum one = coadjoint(turn(), m);
+    return polynomial(m, one, coadjoint(turn(), one), f_.s * f_.k, half_square_);
   }
 
   /// ṗ where ξ̇ = v and ṁ is known.
   [[nodiscard, gnu::flatten]] Momentum momentum_rate(const Rate& v, const Momentum& m,
                                                      const Momentum& m_rate) const noexcept {
     const S turns = S(2) * product(xi_, v);
-    const Momentum one = coadjoint(xi_, m);
-    const Momentum two = coadjoint(xi_, one);
-    const Momentum d_one = coadjoint(v, m) + coadjoint(xi_, m_rate);
-    const Momentum d_two = coadjoint(v, one) + coadjoint(xi_, d_one);
+    const Rate turning = group.template part<true>(v);
+    const Momentum one = coadjoint(turn(), m);
+    const Momentum two = coadjoint(turn(), one);
+    const Momentum d_one = coadjoint(turning, m) + coadjoint(turn(), m_rate);
+    const Momentum d_two = coadjoint(turning, one) + coadjoint(turn(), d_one);
+    const S half_slope = S(0.5) * f_.s * f_.d;
+    const S square_slope = mul_add(S(0.125) * f_.s, f_.d, S(-1) * f_.k * f_.e);
     const Momentum sum = mul_add(square_, d_two, mul_add(half_square_, d_one, m_rate));
-    if constexpr (factors == 1) {
-      return mul_add(-turns * half_slope_, one, mul_add(-turns * square_slope_, two, sum));
-    } else {
-      const Momentum three = coadjoint(xi_, two);
-      const Momentum four = coadjoint(xi_, three);
-      const Momentum d_three = coadjoint(v, two) + coadjoint(xi_, d_two);
-      const Momentum d_four = coadjoint(v, three) + coadjoint(xi_, d_three);
-      const S half_curve = S(0.25) * mul_add(f_.d, f_.d, S(2) * f_.s * f_.e);
-      const S square_curve = mul_add(S(0.0625) * f_.d, f_.d, S(-1) * f_.k * f_.f);
-      return mul_add(half_slope_, mul_add(t_, d_one, d_three),
-                     mul_add(square_slope_, mul_add(t_, d_two, d_four),
-                             mul_add(-turns * half_curve, mul_add(t_, one, three),
-                                     mul_add(-turns * square_curve, mul_add(t_, two, four), sum))));
-    }
+    return joined(mul_add(-turns * half_slope, one, mul_add(-turns * square_slope, two, sum)),
+                  m_rate);
+  }
+
+  /// What of a rate turns the frame in which m is seen.
+  [[nodiscard]] static Rate turn_of(const Rate& x) noexcept { return group.template part<true>(x); }
+
+  /// ṁ where nothing acts on a body of momentum μ, body frame, that moves by B: −V × P.
+  [[nodiscard]] static Momentum coupling(const Rate& b, const Momentum& mu) noexcept
+    requires(translates)
+  {
+    return coadjoint(group.template part<false>(b), mu);
   }
 
  private:
-  /// (1 + (odd + odd_slope z) f + (even + even_slope z) f²) y with z = f² + θ².
-  template <class T, class Map>
-  [[nodiscard]] T applied(const T& y, const Map& f, const S& odd, const S& odd_slope, const S& even,
-                          const S& even_slope) const noexcept {
-    const T one = f(y);
-    const T two = f(one);
-    const T sum = mul_add(even, two, mul_add(odd, one, y));
-    if constexpr (factors == 1) {
-      return sum;
-    } else {
-      const T three = f(two);
-      return mul_add(odd_slope, mul_add(t_, one, three),
-                     mul_add(even_slope, mul_add(t_, two, f(three)), sum));
-    }
+  /// y + odd f(y) + even f²(y).
+  template <class T>
+  [[nodiscard]] static T polynomial(const T& y, const T& one, const T& two, const S& odd,
+                                    const S& even) noexcept {
+    return mul_add(even, two, mul_add(odd, one, y));
   }
 
-  [[nodiscard]] auto turn() const noexcept {
-    return [this](const Momentum& y) { return coadjoint(xi_, y); };
+  /// What turns of one, and the translations of the other.
+  template <class T>
+  [[nodiscard]] static T joined(const T& turns, const T& shifts) noexcept {
+    auto x = turns.components();
+    if constexpr (translates) {
+      const auto y = shifts.components();
+      for (std::size_t k = 0; k < dimension; ++k) {
+        if (group.weights[k] == 0) x[k] = y[k];
+      }
+    }
+    return T::from(x);
   }
+
+  [[nodiscard]] Rate turn() const noexcept { return group.template part<true>(xi_); }
+  [[nodiscard]] Rate shift() const noexcept { return group.template part<false>(xi_); }
 
   /// The scalar product of which θ² is the square.
   [[nodiscard]] static S product(const Rate& a, const Rate& b) noexcept {
@@ -327,36 +372,41 @@ class CanonicalChart {
     const auto y = b.components();
     S sum(0);
     for (std::size_t k = 0; k < dimension; ++k) {
-      if (polynomial.weights[k] != 0) sum = mul_add(S(polynomial.weights[k]) * x[k], y[k], sum);
+      if (group.weights[k] != 0) sum = mul_add(S(group.weights[k]) * x[k], y[k], sum);
     }
     return sum;
   }
 
-  // Functions of z = ad² at z = −θ², and slopes by z; curves are second derivatives.
   Rate xi_{};
   S t_{};
   detail::TurningFunctions<S> f_{};
-  S half_square_{};  ///< (cosh √z − 1)/z
-  S half_slope_{};
-  S square_{};  ///< (sinh √z − √z)/√z³
-  S square_slope_{};
-  S inverse_square_{};  ///< ((√z/2) coth (√z/2) − 1)/z
-  S inverse_slope_{};
+  S half_square_{};     ///< (1 − cos θ)/θ²
+  S square_{};          ///< (θ − sin θ)/θ³
+  S inverse_square_{};  ///< (1 − (θ/2) cot (θ/2))/θ²
 };
 
 /// By series in ad.
 template <class G, class S>
-class CanonicalChart<G, S, 0> {
+class CanonicalChart<G, S, false> {
+  using Element = typename G::template Element<S>;
   using Rate = typename G::template Rate<S>;
   using Momentum = typename G::template Momentum<S>;
 
  public:
-  CanonicalChart() = default;
-  explicit CanonicalChart(const Rate& xi) noexcept : xi_(xi) {}
+  static constexpr bool translates = false;
+
+  CanonicalChart() noexcept : CanonicalChart(Rate{}) {}
+  explicit CanonicalChart(const Rate& xi) noexcept : CanonicalChart(xi, exp(xi)) {}
 
   [[nodiscard]] const Rate& xi() const noexcept { return xi_; }
 
-  [[nodiscard]] CanonicalChart opposite() const noexcept { return CanonicalChart(S(-1) * xi_); }
+  [[nodiscard]] CanonicalChart opposite() const noexcept {
+    return CanonicalChart(S(-1) * xi_, reverse(element_));
+  }
+
+  [[nodiscard]] const Element& element() const noexcept { return element_; }
+
+  [[nodiscard]] Rate whole_logarithm() const noexcept { return S(2) * xi_; }
 
   [[nodiscard]] Rate rate(const Rate& b) const noexcept {
     return detail::dexp_series_inverse(b, [&](const Rate& y) { return ad(y, xi_); });
@@ -375,7 +425,7 @@ class CanonicalChart<G, S, 0> {
   }
 
   [[nodiscard]] Momentum body_momentum(const Momentum& m) const noexcept {
-    return m + detail::momentum_change(m, xi_);
+    return Ad_star(element_, m);
   }
 
   [[nodiscard]] Momentum momentum_rate(const Rate& v, const Momentum& m,
@@ -393,12 +443,17 @@ class CanonicalChart<G, S, 0> {
     return sum;
   }
 
+  [[nodiscard]] static const Rate& turn_of(const Rate& x) noexcept { return x; }
+
  private:
+  CanonicalChart(const Rate& xi, const Element& element) noexcept : xi_(xi), element_(element) {}
+
   [[nodiscard]] auto turn() const noexcept {
     return [this](const Momentum& y) { return coadjoint(xi_, y); };
   }
 
-  Rate xi_{};
+  Rate xi_;
+  Element element_;
 };
 
 }  // namespace hamotor

@@ -1,9 +1,10 @@
 // Gauss collocation on T*G: implicit, symmetric, symplectic, of order 2s with s stages, for any H.
 //
-// Variational: the discrete Lagrangian of a step is the action of Gauss's quadrature along the
-// curve M(τ) = M̂ exp ξ(τ), ξ a polynomial of degree s, extremal among those with the same ends.  M̂
-// is half-way between the ends, M₀ exp(X/2) with M₁ = M₀ exp X, ξ = ∓X/2 there, which makes the
-// step symmetric.  One stage is the Lie midpoint rule.  (Marsden & West 2001; Bogfjellmo &
+// Variational: the discrete Lagrangian of a step is the action of Gauss's quadrature along a curve
+// whose coordinates ξ about M̂ are a polynomial of degree s, extremal among those with the same
+// ends. These are at ξ = ∓X/2, M̂ half-way between them, which makes the step symmetric.  ξ is the
+// logarithm of M̂~M; of rigid motions, place and turn, so that centres of mass move by Gauss's
+// method as points do.  One stage is the Lie midpoint rule.  (Marsden & West 2001; Bogfjellmo &
 // Marthinsen 2016; Hall & Leok 2017.)
 #pragma once
 
@@ -35,20 +36,19 @@ namespace detail {
 
 /// Gauss collocation on the group, s = 1 to 8 stages, order 2s, for any H(M, μ, t).
 ///
-/// With chart momenta p = dexp_−ξ^T m, m = Ad*⁻¹_{exp ξ} μ the momentum seen from M̂, a stage is
+/// With chart momenta p of m, the body's momentum turned back to the frame of M̂, a stage is
 ///     ξ_i = h Σ ã_ij ξ̇_j,  p_i = ½(p₀ + p₁) + h Σ ã_ij ṗ_j,  ã_ij = a_ij − b_j/2,
-/// and momenta obey M₁μ₁M̃₁ = M₀μ₀M̃₀ − h Σ b_i F_i, F_i the stages' spatial forques: where H is
-/// left-invariant, spatial momentum and Casimirs are constant but for rounding.
+/// and momenta obey m₁ = m₀ + h Σ b_i ṁ_i, which with P × V and the forques makes the balance of
+/// spatial momentum: where H is left-invariant, it and Casimirs are constant but for rounding.
 ///
 /// ξ̇ and ṁ are iterated until no component's change shrinks any more, which is where rounding stops
 /// them (Hairer, McLachlan & Razakarivony 2008; Antoñana, Makazaga & Murua 2017), from the last
 /// step's polynomials: to a fixed point while that contracts, else by Newton's method with one
 /// Jacobian for many steps, so that fast spins and stiff springs converge too (up to 48 unknowns a
 /// stage: four bodies in space).  Where stages act on each other as that Jacobian does not know
-/// (one moment a millionth of the others, many radii of gyration in a turning step), it takes that
-/// of all stages together (up to 96 unknowns).  What stopped them is held against what rounding of
-/// the stages does to ξ̇ and ṁ.  Where they settle nowhere else, or not in 20 iterations and one a
-/// bit, the state becomes not a number.
+/// (one moment a millionth of the others), it takes that of all stages together (up to 96
+/// unknowns).  What stopped them is held against what rounding of the stages does to ξ̇ and ṁ. Where
+/// they settle nowhere else, or not in 20 iterations and one a bit, the state becomes not a number.
 template <HamiltonianSystem System, std::size_t stages,
           Summation summation = Summation::compensated>
 class Gauss {
@@ -62,7 +62,11 @@ class Gauss {
   static constexpr std::size_t n = System::bodies;
   static constexpr auto dimension = static_cast<std::size_t>(G::dimension);
   static constexpr std::size_t positions = n * dimension;
-  static constexpr std::size_t unknowns = System::has_forque ? 2 * positions : positions;
+  /// Whether P × V turns the spin.
+  static constexpr bool has_coupling = Chart::translates && !PrincipalSystem<System>;
+  /// Whether momenta are unknowns too.
+  static constexpr bool has_push = System::has_forque || has_coupling;
+  static constexpr std::size_t unknowns = has_push ? 2 * positions : positions;
   static constexpr bool has_newton = unknowns <= 48;
   static constexpr bool has_whole = stages * unknowns <= 96;
   static constexpr int whole_steps = 64;
@@ -137,7 +141,7 @@ class Gauss {
 
   /// The first guess where nothing is known: what is at the start.
   constexpr void stay(const System& system, const StateOf<System>& state, const S& t) noexcept {
-    gradients_.fill(numbers(gradient(system, state, t)));
+    gradients_.fill(numbers(state, gradient(system, state, t)));
   }
 
   /// The first guess after a step of the same length: its polynomials, gone on.
@@ -163,10 +167,10 @@ class Gauss {
       for (std::size_t s = 0; s < stages; ++s) {
         for (std::size_t i = 0; i < n; ++i) {
           put(slopes_[s], i, charts_[s][i].rate(rate(gradients_[s], i)));
-          if constexpr (System::has_forque) {
+          if constexpr (has_push) {
             if (sweep == 2) {
               put_push(slopes_[s], i,
-                       Ad_star_inverse(exp(charts_[s][i].xi()), push(gradients_[s], i)));
+                       charts_[s][i].opposite().body_momentum(push(gradients_[s], i)));
             }
           }
         }
@@ -183,29 +187,28 @@ class Gauss {
       for (std::size_t s = 0; s < stages; ++s) {
         x = mul_add(step_weights_[s], rate(slopes_[s], i), x);
         charts_[s][i] = Chart(displacement(s, i));
-        if constexpr (System::has_forque) {
+        if constexpr (has_push) {
           gained = mul_add(step_weights_[s], push(slopes_[s], i), gained);
         }
       }
       gained_[i] = gained;
-      half_way_[i] = S(0.5) * x;
-      half_[i] = exp(half_way_[i]);
-      const Momentum first = Ad_star(half_[i], state.momenta[i]);
+      const Chart chart(S(0.5) * x);
+      const Chart opposite = chart.opposite();
+      half_way_[i] = chart;
+      const Momentum first = chart.body_momentum(state.momenta[i]);
       const Momentum mean = mul_add(S(0.5), gained, first);
-      const Chart chart(half_way_[i]);
-      const Momentum middle =
-          S(0.5) * (chart.opposite().momentum(first) + chart.momentum(first + gained));
+      const Momentum middle = S(0.5) * (opposite.momentum(first) + chart.momentum(first + gained));
       std::array<Momentum, stages> forces{};
       for (std::size_t s = 0; s < stages; ++s) {
         balanced_[s][i] = mean;
-        if constexpr (System::has_forque) {
+        if constexpr (has_push) {
           for (std::size_t r = 0; r < stages; ++r) {
             balanced_[s][i] =
                 mul_add(table.skew[s][r] * step_weights_[r], push(slopes_[r], i), balanced_[s][i]);
           }
         }
         Momentum changes{};
-        if constexpr (System::has_forque) changes = step_weights_[s] * push(slopes_[s], i);
+        if constexpr (has_push) changes = step_weights_[s] * push(slopes_[s], i);
         forces[s] = charts_[s][i].momentum_rate(step_weights_[s] * rate(slopes_[s], i),
                                                 balanced_[s][i] + beside_[s][i], changes);
       }
@@ -236,7 +239,9 @@ class Gauss {
   /// The state with its motors half-way.
   [[nodiscard]] constexpr StateOf<System> half_way(const StateOf<System>& state) const noexcept {
     StateOf<System> center = state;
-    for (std::size_t i = 0; i < n; ++i) center.motors[i] = gp(state.motors[i], half_[i]);
+    for (std::size_t i = 0; i < n; ++i) {
+      center.motors[i] = gp(state.motors[i], reverse(half_way_[i].opposite().element()));
+    }
     return center;
   }
 
@@ -252,22 +257,18 @@ class Gauss {
                                                           const std::array<Chart, n>& charts,
                                                           const Momenta& m, const S& t) noexcept {
     Seen seen{center};
-    std::array<Element, n> way{};
     for (std::size_t i = 0; i < n; ++i) {
-      if constexpr (System::has_forque) {
-        way[i] = exp(charts[i].xi());
-        seen.state.motors[i] = gp(center.motors[i], way[i]);
-        seen.state.momenta[i] = Ad_star(way[i], m[i]);
-      } else {  // H does not know the motors.
-        seen.state.momenta[i] = charts[i].body_momentum(m[i]);
+      if constexpr (System::has_forque) {  // H does not know the motors where it has none.
+        seen.state.motors[i] = gp(center.motors[i], charts[i].element());
       }
+      seen.state.momenta[i] = charts[i].body_momentum(m[i]);
     }
     const auto now = hamotor::gradient(system, seen.state, t);
-    seen.gradient = numbers(now);
+    seen.gradient = numbers(seen.state, now);
     for (std::size_t i = 0; i < n; ++i) {
       put(seen.slope, i, charts[i].rate(now.rates[i]));
-      if constexpr (System::has_forque) {
-        put_push(seen.slope, i, S(-1) * Ad_star_inverse(way[i], now.forques[i]));
+      if constexpr (has_push) {
+        put_push(seen.slope, i, charts[i].opposite().body_momentum(push(seen.gradient, i)));
       }
     }
     return seen;
@@ -409,7 +410,7 @@ class Gauss {
         const S pushed = detail::largest(momenta_[s][i]) + detail::largest(gained_[i]);
         for (std::size_t k = 0; k < dimension; ++k) {
           units[s][i * dimension + k] = root * (scalar::abs(rates[k]) + least);
-          if constexpr (System::has_forque) {
+          if constexpr (has_push) {
             units[s][positions + i * dimension + k] =
                 select(pushed > S(0), root * pushed / scalar::abs(h_), S(1));
           }
@@ -485,9 +486,9 @@ class Gauss {
           // The balance of p, of which m is made, and what the step began with, turned.
           Momentum p = charts_[s][i].momentum(momenta[i]);
           rounded(p);
-          Momentum before = Ad_star_inverse(half_[i], charts[i].seen_from_center(p));
+          Momentum before = half_way_[i].opposite().body_momentum(charts[i].seen_from_center(p));
           rounded(before);
-          momenta[i] = Ad_star(half_[i], before);
+          momenta[i] = half_way_[i].body_momentum(before);
         }
         const Vector moved = less(slope(system, off, charts, momenta, then).slope,
                                   slope(system, center, charts_[s], momenta_[s], then).slope);
@@ -517,7 +518,7 @@ class Gauss {
           const std::size_t at = i * dimension + k;
           changed = changed + scalar::abs(by[s][at] * m[k]);
           whole = whole + scalar::abs(slopes_[s][at] * m[k]);
-          if constexpr (System::has_forque) {
+          if constexpr (has_push) {
             const S pushed = h_ * by[s][positions + at];
             changed = changed + scalar::abs(slopes_[s][at] * pushed);
             both = both + scalar::abs(by[s][at] * pushed);
@@ -547,7 +548,7 @@ class Gauss {
     const std::array<Chart, n> middle{};
     Momenta momenta{};
     for (std::size_t i = 0; i < n; ++i) {
-      momenta[i] = mul_add(S(0.5), gained_[i], Ad_star(half_[i], state.momenta[i]));
+      momenta[i] = mul_add(S(0.5), gained_[i], half_way_[i].body_momentum(state.momenta[i]));
     }
     using Matrix = detail::Matrix<S, unknowns>;
     const Matrix jacobian = differences(
@@ -556,12 +557,13 @@ class Gauss {
     const auto common = [&](std::size_t s) {
       return differences(system, center, charts_[s], momenta_[s], mul_add(table.nodes[s], h_, t),
                          [&](auto& moved, auto&, auto& m, std::size_t i, const Rate& by) {
-                           // δM̂ = M̂ dexp_{X/2}(δX/2).
-                           const Rate eta = Chart(half_way_[i]).body_rate(by);
+                           const Chart opposite = half_way_[i].opposite();
+                           const Rate eta = Ad(opposite.element(), opposite.body_rate(by));
                            moved.motors[i] =
                                moved.motors[i] + detail::motor_change(moved.motors[i], eta);
                            // What the step began with is seen from there.
-                           m[i] = m[i] + coadjoint(eta, Ad_star(half_[i], state.momenta[i]));
+                           m[i] = m[i] + coadjoint(Chart::turn_of(eta),
+                                                   half_way_[i].body_momentum(state.momenta[i]));
                          });
     };
     Matrix mean = common(0);
@@ -608,7 +610,7 @@ class Gauss {
         move(moved_center, moved_charts, moved_momenta, i, Rate::from(unit));
         fill(i * dimension + k, slope(system, moved_center, moved_charts, moved_momenta, t).slope,
              unit[k]);
-        if constexpr (System::has_forque) {
+        if constexpr (has_push) {
           if (!(pushed > S(0))) continue;
           unit[k] = root * pushed;
           moved_momenta = momenta;
@@ -625,11 +627,11 @@ class Gauss {
   constexpr void finish(StateOf<System>& state) noexcept {
     ChangeOf<System> change{};
     for (std::size_t i = 0; i < n; ++i) {
-      const Rate x = S(2) * half_way_[i];
+      const Rate x = half_way_[i].whole_logarithm();
       change.motors[i] = detail::motor_change(state.motors[i], x);
-      change.momenta[i] = detail::momentum_change(state.momenta[i], x);
-      if constexpr (System::has_forque) {
-        change.momenta[i] = change.momenta[i] + Ad_star(half_[i], gained_[i]);
+      change.momenta[i] = detail::momentum_change(state.momenta[i], Chart::turn_of(x));
+      if constexpr (has_push) {
+        change.momenta[i] = change.momenta[i] + half_way_[i].body_momentum(gained_[i]);
       }
     }
     detail::record(drift_, low_.add(state, change));
@@ -651,12 +653,18 @@ class Gauss {
     return xi;
   }
 
-  /// B and −F.
-  [[nodiscard]] static constexpr Vector numbers(const Gradients& slope) noexcept {
+  /// B and what pushes μ, body frame.
+  [[nodiscard]] static constexpr Vector numbers(const StateOf<System>& state,
+                                                const Gradients& slope) noexcept {
     Vector x{};
     for (std::size_t i = 0; i < n; ++i) {
       put(x, i, slope.rates[i]);
-      if constexpr (System::has_forque) put_push(x, i, S(-1) * slope.forques[i]);
+      if constexpr (has_push) {
+        Momentum push{};
+        if constexpr (System::has_forque) push = push - slope.forques[i];
+        if constexpr (has_coupling) push = push + Chart::coupling(slope.rates[i], state.momenta[i]);
+        put_push(x, i, push);
+      }
     }
     return x;
   }
@@ -690,8 +698,7 @@ class Gauss {
   std::array<Momenta, stages> balanced_{};  ///< m as the balance of forques has it
   std::array<Momenta, stages> beside_{};    ///< m less that
   Momenta gained_{};                        ///< h Σ b ṁ
-  std::array<Rate, n> half_way_{};          ///< X/2
-  std::array<Element, n> half_{};           ///< exp(X/2)
+  std::array<Chart, n> half_way_{};         ///< that of M₁, at X/2
   std::array<S, stages> step_weights_{};    ///< h b
   std::array<S, stages> power_{};
   Vector lowest_{};  ///< the smallest change of each component so far

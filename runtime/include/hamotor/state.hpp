@@ -146,13 +146,20 @@ template <HamiltonianSystem System>
   }
 }
 
-/// [μ, B] for every body at these rates; a system may know better what of it cancels.
+/// A system of bodies in principal frames, where P × V vanishes: it finds [μ, B] without.
+template <class System>
+concept PrincipalSystem =
+    requires(const System& system, const decltype(StateOf<System>::momenta)& momenta) {
+      system.free_momentum_rates(momenta);
+    };
+
+/// [μ, B] for every body at these rates.
 template <HamiltonianSystem System>
 [[nodiscard]] constexpr auto free_momentum_rates(
     const System& system, const decltype(StateOf<System>::momenta)& momenta,
     const std::array<typename System::Group::template Rate<typename System::Scalar>,
                      System::bodies>& rates) noexcept {
-  if constexpr (requires { system.free_momentum_rates(momenta); }) {
+  if constexpr (PrincipalSystem<System>) {
     return system.free_momentum_rates(momenta);
   } else {
     auto result = momenta;

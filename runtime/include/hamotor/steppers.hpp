@@ -139,55 +139,28 @@ class ExplicitMethod {
   template <std::same_as<Rates>... X>
   constexpr void turn(StateOf<System>& state, const S& by, const Momenta& forces, const S& power,
                       const X&... x) noexcept {
-    if constexpr (compensated) {
-      ChangeOf<System> change{};
-      for (std::size_t i = 0; i < n; ++i) {
-        const auto gain = [&](const Rate& turned) {
-          change.motors[i] =
-              change.motors[i] + motor_change(state.motors[i] + change.motors[i], turned);
-        };
-        (gain(x[i]), ...);
-        change.momenta[i] = by * forces[i];
-      }
-      record(drift_, low_.add(state, change));
-    } else {
-      std::array<S, n> defects{};
-      for (std::size_t i = 0; i < n; ++i) {
-        auto& motor = state.motors[i];
-        ((motor = gp(motor, exp(x[i]))), ...);
-        const auto defect = unit_defect(motor);
-        defects[i] = size(defect);
-        motor = motor + unit_correction(motor, defect);
-        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
-      }
-      record(drift_, defects);
-    }
-    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+    move(
+        state, by, forces, power,
+        [&](std::size_t i) {
+          Motor change{};
+          ((change = change + motor_change(state.motors[i] + change, x[i])), ...);
+          return change;
+        },
+        [&](std::size_t i, Motor& motor) {
+          ((motor = gp(motor, exp(x[i]))), ...);
+          return unit_defect(motor);
+        });
   }
 
   /// The same where motors gain `by` times `motors`.
   constexpr void shift(StateOf<System>& state, const S& by, const Motors& motors,
                        const Momenta& forces, const S& power) noexcept {
-    if constexpr (compensated) {
-      ChangeOf<System> change{};
-      for (std::size_t i = 0; i < n; ++i) {
-        change.motors[i] = by * motors[i];
-        change.momenta[i] = by * forces[i];
-      }
-      record(drift_, low_.add(state, change));
-    } else {
-      std::array<S, n> defects{};
-      for (std::size_t i = 0; i < n; ++i) {
-        auto& motor = state.motors[i];
-        motor = mul_add(by, motors[i], motor);
-        const auto defect = rounded_defect(motor);
-        defects[i] = size(defect);
-        motor = motor + unit_correction(motor, defect);
-        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
-      }
-      record(drift_, defects);
-    }
-    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+    move(
+        state, by, forces, power, [&](std::size_t i) { return by * motors[i]; },
+        [&](std::size_t i, Motor& motor) {
+          motor = mul_add(by, motors[i], motor);
+          return rounded_defect(motor);
+        });
   }
 
   /// Six times the mean of a step of the classical method.
@@ -198,6 +171,32 @@ class ExplicitMethod {
   }
 
  private:
+  /// Motors gain `change(i)`, or, in plain sums, are what `moved(i, motor)` makes of them, which
+  /// returns how far off the group.
+  template <class Change, class Moved>
+  constexpr void move(StateOf<System>& state, const S& by, const Momenta& forces, const S& power,
+                      const Change& change, const Moved& moved) noexcept {
+    if constexpr (compensated) {
+      ChangeOf<System> changes{};
+      for (std::size_t i = 0; i < n; ++i) {
+        changes.motors[i] = change(i);
+        changes.momenta[i] = by * forces[i];
+      }
+      record(drift_, low_.add(state, changes));
+    } else {
+      std::array<S, n> defects{};
+      for (std::size_t i = 0; i < n; ++i) {
+        auto& motor = state.motors[i];
+        const auto defect = moved(i, motor);
+        defects[i] = size(defect);
+        motor = motor + unit_correction(motor, defect);
+        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
+      }
+      record(drift_, defects);
+    }
+    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+  }
+
   [[no_unique_address]] LowDigits<System, summation> low_;
   Drift<S> drift_;
   S work_{};

@@ -26,10 +26,9 @@ struct BodyChange {
   typename G::template Momentum<S> momentum;
 };
 
-/// Rigid body that moves freely, in its central principal frame: mass (kg), principal moments (kg
-/// m²) about the centre of mass, which is the frame's origin.
-template <class G, class S, RotationSplit split = RotationSplit{}>
-class FreeBody {
+/// What rigid bodies in their principal frames share: their inertia and their free motion.
+template <class G, class S, RotationSplit split>
+class PrincipalBody {
  public:
   using Group = G;
   using Scalar = S;
@@ -40,59 +39,26 @@ class FreeBody {
   using Origin = typename Space<G>::template Origin<S>;
   using Direction = typename Space<G>::template Direction<S>;
   static constexpr std::size_t rotations = Space<G>::rotations;
-  static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr std::size_t dimension = Space<G>::dimension;
+  static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
   static constexpr bool spin_apart = split.spin_apart;
   static constexpr bool nearly_symmetric = split.nearly_symmetric;
   /// Whether the free rotation is composed of turns about two axes.
   static constexpr bool has_two_turns = !free_motion_is_exact;
-  static_assert(Space<G>::translates, "a body of a group of rotations is a PivotedBody");
 
-  constexpr FreeBody(const S& mass, const std::array<S, rotations>& moments) noexcept
-      : mass_(mass), inverse_mass_(S(1) / mass), rotation_(moments) {}
-
+  /// kg.
   [[nodiscard]] constexpr const S& mass() const noexcept { return mass_; }
 
-  /// Principal moments, kg m².
+  /// Principal moments about the frame's origin, kg m².
   [[nodiscard]] constexpr const std::array<S, rotations>& moments() const noexcept {
     return rotation_.moments();
-  }
-
-  /// B = ∂T/∂μ: Ω = Π/J, V = P/m.
-  [[nodiscard]] constexpr Rate rate(const Momentum& mu) const noexcept {
-    const auto x = mu.components();
-    return Rate::from(
-        detail::joined(rotation_.rate(detail::first<rotations>(x)), velocity(x, inverse_mass_)));
-  }
-
-  /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out: in orbit it
-  /// is the difference of products that are larger than any torque by all digits.
-  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
-    const auto x = mu.components();
-    const auto pi = detail::first<rotations>(x);
-    const auto turning = rotation_.rate(pi);
-    const auto p = detail::rest<rotations>(x);
-    if constexpr (rotations == 3) {
-      return Momentum::from(detail::joined(detail::cross(pi, turning), detail::cross(p, turning)));
-    } else {
-      return Momentum::from({S(0), p[1] * turning[0], -p[0] * turning[0]});
-    }
-  }
-
-  /// ½ μ(B), J.
-  [[nodiscard]] constexpr S kinetic(const Momentum& mu) const noexcept {
-    const auto x = mu.components();
-    const auto p = detail::rest<rotations>(x);
-    return rotation_.energy(detail::first<rotations>(x)) +
-           S(0.5) * inverse_mass_ * detail::dot(p, p);
   }
 
   /// The free motion in the time h, less the spin where that is apart.  Translation (|P|² is a
   /// Casimir) and rotation commute, so that nothing is lost by splitting them.
   [[nodiscard]] constexpr BodyChange<G, S> free_change(const Element& m, const Momentum& mu,
                                                        const S& h) const noexcept {
-    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
-                 rotation_.free_change(detail::first<rotations>(mu.components()), h));
+    return moved(m, mu, h, rotation_.free_change(angular(mu), h));
   }
 
   /// The spin that is apart, in the time h.
@@ -100,7 +66,7 @@ class FreeBody {
                                                        const S& h) const noexcept
     requires(spin_apart)
   {
-    return turned(m, mu, rotation_.spin_change(detail::first<rotations>(mu.components()), h));
+    return turned(m, mu, rotation_.spin_change(angular(mu), h));
   }
 
   /// All of the free motion in the time h, by a splitting of the rotation.
@@ -108,8 +74,7 @@ class FreeBody {
   [[nodiscard]] constexpr BodyChange<G, S> free_step(
       const Element& m, const Momentum& mu, const S& h,
       const SplittingWeights<S, stages>& weights) const noexcept {
-    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
-                 rotation_.free_step(detail::first<rotations>(mu.components()), h, weights));
+    return moved(m, mu, h, rotation_.free_step(angular(mu), h, weights));
   }
 
   /// A part of the free motion: the turn about the axis o, or about i, in the time h; `is_small`
@@ -120,15 +85,14 @@ class FreeBody {
   {
     constexpr auto axis = static_cast<std::size_t>(is_outer ? split.outer : split.inner);
     detail::turn_body<axis>(m, mu,
-                            rotation_.template half_turn<is_outer, is_small>(
-                                detail::first<rotations>(mu.components()), h));
+                            rotation_.template half_turn<is_outer, is_small>(angular(mu), h));
   }
 
   /// Whether those turns are small and remain so.
   [[nodiscard]] constexpr bool turns_stay_small(const Momentum& mu, const S& h) const noexcept
     requires(has_two_turns)
   {
-    return rotation_.turns_stay_small(detail::first<rotations>(mu.components()), h);
+    return rotation_.turns_stay_small(angular(mu), h);
   }
 
   /// What else the free motion adds in the time h: it commutes with those turns, and is exact.
@@ -136,8 +100,108 @@ class FreeBody {
                                                             const S& h) const noexcept
     requires(has_two_turns)
   {
-    return moved(m, mu, velocity(mu.components(), h * inverse_mass_),
-                 {rotation_.spherical_change(detail::first<rotations>(mu.components()), h), {}});
+    return moved(m, mu, h, {rotation_.spherical_change(angular(mu), h), {}});
+  }
+
+ protected:
+  using Rotation = PrincipalRotation<S, rotations, split>;
+  using Turning = typename Rotation::Change;
+
+  constexpr PrincipalBody(const S& mass, const std::array<S, rotations>& moments) noexcept
+      : mass_(mass), inverse_mass_(S(1) / mass), rotation_(moments) {}
+
+  S mass_;
+  S inverse_mass_;
+  Rotation rotation_;
+
+  /// Π.
+  [[nodiscard]] static constexpr std::array<S, rotations> angular(const Momentum& mu) noexcept {
+    return detail::first<rotations>(mu.components());
+  }
+
+  /// P times a factor.
+  [[nodiscard]] static constexpr std::array<S, dimension> velocity(const Momentum& mu,
+                                                                   const S& factor) noexcept {
+    auto v = detail::rest<rotations>(mu.components());
+    for (S& x : v) x = factor * x;
+    return v;
+  }
+
+  [[nodiscard]] static constexpr BodyChange<G, S> turned(const Element& m,
+                                                         [[maybe_unused]] const Momentum& mu,
+                                                         const Turning& by) noexcept {
+    const Element change = Space<G>::rotation_change(m, by.rotor);
+    if constexpr (Space<G>::translates) {
+      const auto p = detail::rest<rotations>(mu.components());
+      return {change,
+              Momentum::from(detail::joined(by.angular, detail::turned_back_change(by.rotor, p)))};
+    } else {
+      return {change, Momentum::from(by.angular)};
+    }
+  }
+
+ private:
+  /// First, where bodies translate, by V h in the body frame, then turned.
+  [[nodiscard]] constexpr BodyChange<G, S> moved(const Element& m, const Momentum& mu,
+                                                 [[maybe_unused]] const S& h,
+                                                 const Turning& by) const noexcept {
+    if constexpr (Space<G>::translates) {
+      const Element shift = Space<G>::translation_change(m, velocity(mu, h * inverse_mass_));
+      const auto change = turned(m + shift, mu, by);
+      return {shift + change.motor, change.momentum};
+    } else {
+      return turned(m, mu, by);
+    }
+  }
+};
+
+/// Rigid body that moves freely, in its central principal frame: mass (kg), principal moments (kg
+/// m²) about the centre of mass, which is the frame's origin.
+template <class G, class S, RotationSplit split = RotationSplit{}>
+class FreeBody : public PrincipalBody<G, S, split> {
+  using Base = PrincipalBody<G, S, split>;
+  using Base::angular;
+  using Base::inverse_mass_;
+  using Base::mass_;
+  using Base::rotation_;
+  using Base::velocity;
+
+ public:
+  using Base::dimension;
+  using Base::rotations;
+  using typename Base::Direction;
+  using typename Base::Element;
+  using typename Base::Momentum;
+  using typename Base::Origin;
+  using typename Base::Point;
+  using typename Base::Rate;
+  static_assert(Space<G>::translates, "a body of a group of rotations is a PivotedBody");
+
+  constexpr FreeBody(const S& mass, const std::array<S, rotations>& moments) noexcept
+      : Base(mass, moments) {}
+
+  /// B = ∂T/∂μ: Ω = Π/J, V = P/m.
+  [[nodiscard]] constexpr Rate rate(const Momentum& mu) const noexcept {
+    return Rate::from(detail::joined(rotation_.rate(angular(mu)), velocity(mu, inverse_mass_)));
+  }
+
+  /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out: in orbit it
+  /// is the difference of products that are larger than any torque by all digits.
+  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
+    const auto pi = angular(mu);
+    const auto turning = rotation_.rate(pi);
+    const auto p = detail::rest<rotations>(mu.components());
+    if constexpr (rotations == 3) {
+      return Momentum::from(detail::joined(detail::cross(pi, turning), detail::cross(p, turning)));
+    } else {
+      return Momentum::from({S(0), p[1] * turning[0], -p[0] * turning[0]});
+    }
+  }
+
+  /// ½ μ(B), J.
+  [[nodiscard]] constexpr S kinetic(const Momentum& mu) const noexcept {
+    const auto p = detail::rest<rotations>(mu.components());
+    return rotation_.energy(angular(mu)) + S(0.5) * inverse_mass_ * detail::dot(p, p);
   }
 
   /// Where a point of the principal frame is in the world, m.
@@ -167,72 +231,31 @@ class FreeBody {
     for (std::size_t k = 0; k < dimension; ++k) p[k] = -mass_ * f[k];
     return Momentum::from(detail::joined(std::array<S, rotations>{}, p));
   }
-
- private:
-  using Turning = typename PrincipalRotation<S, rotations, split>::Change;
-
-  [[nodiscard]] static constexpr BodyChange<G, S> turned(const Element& m, const Momentum& mu,
-                                                         const Turning& by) noexcept {
-    return {Space<G>::rotation_change(m, by.rotor),
-            Momentum::from(detail::joined(
-                by.angular,
-                detail::turned_back_change(by.rotor, detail::rest<rotations>(mu.components()))))};
-  }
-
-  /// First by d in the body frame, then turned.
-  [[nodiscard]] static constexpr BodyChange<G, S> moved(const Element& m, const Momentum& mu,
-                                                        const std::array<S, dimension>& d,
-                                                        const Turning& by) noexcept {
-    const Element shift = Space<G>::translation_change(m, d);
-    const auto change = turned(m + shift, mu, by);
-    return {shift + change.motor, change.momentum};
-  }
-
-  [[nodiscard]] static constexpr std::array<S, dimension> velocity(
-      const std::array<S, rotations + dimension>& x, const S& factor) noexcept {
-    std::array<S, dimension> v{};
-    for (std::size_t k = 0; k < dimension; ++k) v[k] = factor * x[rotations + k];
-    return v;
-  }
-
-  S mass_;
-  S inverse_mass_;
-  PrincipalRotation<S, rotations, split> rotation_;
 };
 
 /// Rigid body with a fixed point, in the principal frame about that point: mass (kg), principal
 /// moments about the fixed point (kg m²), centre of mass (m, that frame), and where in the world
 /// the fixed point is (m).  Spatial momenta are taken about the fixed point.
 template <class G, class S, RotationSplit split = RotationSplit{}>
-class PivotedBody {
+class PivotedBody : public PrincipalBody<G, S, split> {
+  using Base = PrincipalBody<G, S, split>;
+  using Base::mass_;
+  using Base::rotation_;
+
  public:
-  using Group = G;
-  using Scalar = S;
-  using Element = typename G::template Element<S>;
-  using Rate = typename G::template Rate<S>;
-  using Momentum = typename G::template Momentum<S>;
-  using Point = typename Space<G>::template Point<S>;
-  using Direction = typename Space<G>::template Direction<S>;
-  static constexpr std::size_t rotations = Space<G>::rotations;
-  static constexpr bool free_motion_is_exact = PrincipalRotation<S, rotations, split>::is_exact;
-  static constexpr std::size_t dimension = Space<G>::dimension;
-  static constexpr bool spin_apart = split.spin_apart;
-  static constexpr bool nearly_symmetric = split.nearly_symmetric;
-  /// Whether the free rotation is composed of turns about two axes.
-  static constexpr bool has_two_turns = !free_motion_is_exact;
+  using Base::dimension;
+  using Base::rotations;
+  using typename Base::Direction;
+  using typename Base::Element;
+  using typename Base::Momentum;
+  using typename Base::Point;
+  using typename Base::Rate;
   static_assert(!Space<G>::translates, "a body of a group that translates is a FreeBody");
 
   constexpr PivotedBody(const S& mass, const std::array<S, rotations>& moments,
                         const std::array<S, dimension>& center_of_mass,
                         const std::array<S, dimension>& fixed_point) noexcept
-      : mass_(mass), center_(center_of_mass), pivot_(fixed_point), rotation_(moments) {}
-
-  [[nodiscard]] constexpr const S& mass() const noexcept { return mass_; }
-
-  /// Principal moments about the fixed point, kg m².
-  [[nodiscard]] constexpr const std::array<S, rotations>& moments() const noexcept {
-    return rotation_.moments();
-  }
+      : Base(mass, moments), center_(center_of_mass), pivot_(fixed_point) {}
 
   /// Where the fixed point is, world frame, m.
   [[nodiscard]] constexpr const std::array<S, dimension>& fixed_point() const noexcept {
@@ -254,66 +277,18 @@ class PivotedBody {
     return rotation_.energy(mu.components());
   }
 
-  /// The free motion in the time h, less the spin where that is apart.
-  [[nodiscard]] constexpr BodyChange<G, S> free_change(const Element& m, const Momentum& mu,
-                                                       const S& h) const noexcept {
-    return turned(m, rotation_.free_change(mu.components(), h));
-  }
-
-  /// The spin that is apart, in the time h.
-  [[nodiscard]] constexpr BodyChange<G, S> spin_change(const Element& m, const Momentum& mu,
-                                                       const S& h) const noexcept
-    requires(spin_apart)
-  {
-    return turned(m, rotation_.spin_change(mu.components(), h));
-  }
-
-  /// All of the free motion in the time h, by a splitting of the rotation.
-  template <std::size_t stages>
-  [[nodiscard]] constexpr BodyChange<G, S> free_step(
-      const Element& m, const Momentum& mu, const S& h,
-      const SplittingWeights<S, stages>& weights) const noexcept {
-    return turned(m, rotation_.free_step(mu.components(), h, weights));
-  }
-
-  /// A part of the free motion: the turn about the axis o, or about i, in the time h; `is_small`
-  /// where it is known to be.
-  template <bool is_outer, bool is_small>
-  HAMOTOR_INLINE constexpr void turn(Element& m, Momentum& mu, const S& h) const noexcept
-    requires(has_two_turns)
-  {
-    constexpr auto axis = static_cast<std::size_t>(is_outer ? split.outer : split.inner);
-    detail::turn_body<axis>(m, mu,
-                            rotation_.template half_turn<is_outer, is_small>(
-                                detail::first<rotations>(mu.components()), h));
-  }
-
-  /// Whether those turns are small and remain so.
-  [[nodiscard]] constexpr bool turns_stay_small(const Momentum& mu, const S& h) const noexcept
-    requires(has_two_turns)
-  {
-    return rotation_.turns_stay_small(detail::first<rotations>(mu.components()), h);
-  }
-
-  /// What else the free motion adds in the time h: it commutes with those turns, and is exact.
-  [[nodiscard]] constexpr BodyChange<G, S> commuting_change(const Element& m, const Momentum& mu,
-                                                            const S& h) const noexcept
-    requires(has_two_turns)
-  {
-    return turned(m, {rotation_.spherical_change(mu.components(), h), {}});
-  }
-
   /// The motion in the field g (world frame, m/s²) in the time h, by a splitting, of a body whose
   /// centre of mass is on its axis of symmetry.
   template <std::size_t stages>
   [[nodiscard]] constexpr BodyChange<G, S> top_step(
       const Element& m, const Momentum& mu, const Direction& g, const S& h,
       const SplittingWeights<S, stages>& weights) const noexcept
-    requires(spin_apart)
+    requires(split.spin_apart)
   {
-    return turned(
-        m, rotation_.top_step(mu.components(), sandwich(reverse(m), g).components(),
-                              mass_ * center_[static_cast<std::size_t>(split.outer)], h, weights));
+    return Base::turned(
+        m, mu,
+        rotation_.top_step(mu.components(), sandwich(reverse(m), g).components(),
+                           mass_ * center_[static_cast<std::size_t>(split.outer)], h, weights));
   }
 
   /// Where a point of the principal frame is in the world, m.
@@ -343,16 +318,8 @@ class PivotedBody {
   }
 
  private:
-  [[nodiscard]] static constexpr BodyChange<G, S> turned(
-      const Element& m,
-      const typename PrincipalRotation<S, rotations, split>::Change& by) noexcept {
-    return {Space<G>::rotation_change(m, by.rotor), Momentum::from(by.angular)};
-  }
-
-  S mass_;
   std::array<S, dimension> center_;
   std::array<S, dimension> pivot_;
-  PrincipalRotation<S, rotations, split> rotation_;
 };
 
 /// A uniform field g (world frame, m/s²): every body has the potential −m g·x, x its centre of
