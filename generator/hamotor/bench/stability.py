@@ -15,10 +15,10 @@ nobody is asked for digits that the state does not hold:
 
 Where h is too long for a method (it stops, its error is beyond 0.1 or does not yet fall as the
 order says) it is judged at h/4 or h/16, at h/256 where h/16 stops or leaves no digit, and the row
-says so.  It stays `unresolved` where that is too long as well, or where rounding × condition leaves no digit in
-a double: all that is asked then is that numbers stay finite and that what is promised for every
-step holds.  A method that stops with all these steps fails.  A case whose end holds
-few digits is judged at a half, a quarter or an eighth of its time, and goes on to its end.
+says so.  It stays `unresolved` where that is too long as well, or where rounding × condition leaves
+no digit in a double: all that is asked then is that numbers stay finite and that what is promised
+for every step holds.  A method that stops with all these steps fails.  A case whose end holds few
+digits is judged at a half, a quarter or an eighth of its time, and goes on to its end.
 
 Beside them: exp and log of every group around multiples of π, runs that must stop cleanly, and a
 mass that no scalar holds.
