@@ -17,7 +17,7 @@ from tests.bench.precision import peers, stopwatch
 
 from hamotor.bench import endpoint, precision, problems, readme, solvers
 from hamotor.bench.account import Progress
-from hamotor.bench.contest import Extent, Row
+from hamotor.bench.contest import Contestant, Extent, Form, Row
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
@@ -268,6 +268,18 @@ def test_what_is_hopelessly_slow_is_not_repeated() -> None:
     assert precision.worth_repeating(rows, ATTITUDE) == [0, 1, 3, 4, 5]
 
 
+def test_other_forms_begin_where_a_method_does_not_fail() -> None:
+    settings = [{"step": 1 / 2**k, "tolerance": 0.0} for k in range(4)]
+    quad = Contestant(
+        "p", "gauss8", "hamotor", "g++", "scene", settings, 1.0, Form(scalar="quad")
+    )  # fmt: skip
+    own = replace(quad, form=Form())
+    first = [{"contestant": "gauss8", "setting": 0.5, "failure": None}]
+    first += [{"contestant": "gauss8", "setting": 1.0, "failure": "not finite"}]
+    found = precision.begun_where_they_do_not_fail([own, quad], first)
+    assert found == [own, replace(quad, settings=settings[1:])]
+
+
 def test_what_there_is_is_counted_by_problem() -> None:
     rows = [
         {
@@ -431,6 +443,36 @@ def test_engines_of_rigid_bodies_are_given_the_same_motion(name: str) -> None:
     for who, row in rows.items():
         here = endpoint.of_quaternion(problem(name).scene, row["final"])
         assert endpoint.errors(here, expected)[ATTITUDE] < (0.3 if who == "Bullet" else 1e-2), who
+
+
+def test_settings_that_take_long_to_fail_are_not_all_tried() -> None:
+    tried = []
+
+    class Failing:
+        set_up_s = 0.0
+
+        def __init__(self, _: peers.Problem | None, setting: int) -> None:
+            self.setting = setting
+
+        def run(self, _: int) -> peers.Result:
+            tried.append(self.setting)
+            if self.setting < 7:
+                raise peers.Refused("no")
+            watch = peers.Watch()
+            watch.time(lambda: None)
+            return peers.Result(watch, [0.0], 1, 1)
+
+    contestant = {
+        "kind": "failing", "settings": list(range(12)), "longest_s": 1e-12, "options": {}
+    }  # fmt: skip
+    job = {"problem": None, "contestants": [contestant], "rounds": 1, "enough_s": 1.0}
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(peers, "MAKERS", {"failing": Failing})
+        said = list(stopwatch.rows(job, lambda: [(0, 9)]))
+    assert [row["setting"] for row in said if "failure" in row] == [0, 2, 5]
+    assert list(dict.fromkeys(tried)) == [0, 2, 5, 9, 10]
+    runs = [row["runs"] for row in said if row.get("setting") == 9 and "runs" in row]
+    assert runs[-1] > runs[0]
 
 
 def test_a_long_run_that_explodes_is_a_row_that_says_when() -> None:

@@ -158,6 +158,10 @@ def measure(
             if part is None:
                 part = {"key": key, **_measured(one, extent, peers)}
                 took.append(time.perf_counter() - began)
+        except KeyboardInterrupt:
+            done = ", ".join(parts) or "no problem yet"
+            say(f"hamotor bench: kept: {done}; the same command goes on with {one.name}")
+            raise
         except HamotorError as refusal:
             if len(problems) == 1:
                 raise
@@ -266,6 +270,7 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
         uncounted = [replace(c, counted=None) for c in ours]
         first = [asdict(row) for row in _times(one, uncounted, replace(extent, rounds=0))]
         leading = leaders(first, one.name, one.norm)
+        contestants = begun_where_they_do_not_fail(contestants, first)
         for compiler in compilers[1:]:
             contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
     next_is("time")
@@ -473,7 +478,7 @@ def _scenes(
         }
         each = dict.fromkeys(by.values())
         progress = Progress(
-            f"{one.name}: compiling {len(choices)} methods and kernels with {compiler}",
+            f"{one.name}: compiling with {compiler}, libraries: {len(choices) + len(each)}",
             len(choices) + len(each),
         )
         libraries = dict(zip(each, pool.map(compiled_to_count, each), strict=True))
@@ -522,11 +527,16 @@ def _times(one: Problem, contestants: Sequence[Contestant], extent: Extent) -> l
         say(f"{one.name}: {len(chosen)} of {len(seen)} settings are worth repeating")
         return [places[k] for k in chosen]
 
-    progress = Progress(f"{one.name}: timing {len(contestants)} contestants", extent.rounds + 1)
+    progress = Progress(f"{one.name}: timing {len(contestants)} contestants", 1)
+    first = _FIRST_LOOK if extent.rounds else 1.0
 
     def tell(round_: int, contestant: int) -> None:
-        doing = f"round {round_} of {extent.rounds}" if round_ else "first look"
-        progress.at(round_ + contestant / len(contestants), doing)
+        done = contestant / len(contestants)
+        if not round_:
+            progress.at(first * done, f"first look at {contestants[contestant].name}")
+        else:
+            done = (round_ - 1 + done) / extent.rounds
+            progress.at(first + (1 - first) * done, f"round {round_} of {extent.rounds}")
 
     answers = solvers.timed(job, worth=worth, progress=tell)
     return [
@@ -535,6 +545,26 @@ def _times(one: Problem, contestants: Sequence[Contestant], extent: Extent) -> l
     ]
 
 
+def begun_where_they_do_not_fail(
+    contestants: Sequence[Contestant], first: Sequence[Mapping[str, Any]]
+) -> list[Contestant]:
+    """Other forms of methods without the steps that are longer than any at which generated kernels
+    in double did not fail: iterations that do not converge take seconds in quad."""
+    longest: dict[str, float] = {}
+    for row in first:
+        if row["failure"] is None:
+            who = row["contestant"]
+            longest[who] = max(longest.get(who, 0.0), row["setting"])
+    return [
+        replace(c, settings=[s for s in c.settings if s["step"] <= longest[c.name]])
+        if c.is_ours and c.label and c.name in longest and not c.settings[0]["tolerance"]
+        else c
+        for c in contestants
+    ]
+
+
+_FIRST_LOOK: Final = 0.7
+"""Its share of the time."""
 _HOPELESS: Final = 10.0
 _COARSE: Final = 1e-2
 

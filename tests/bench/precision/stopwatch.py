@@ -1,10 +1,10 @@
 """Times contestants in one process: `-m tests.bench.precision.stopwatch JOB` writes rows of JSON.
 
 A contestant is a list of settings from coarse to fine.  Each setting runs once or, if short, three
-times, until two in a row
-take longer than the contestant may; who asked is told how each ended, and answers with those that
-are worth more; then rounds go over these of all contestants, so that what else runs on the machine
-disturbs all alike.  Runs in the peers' environment and needs nothing of Hamotor.
+times, until two in a row take longer than the contestant may; after each that fails and takes so
+long, one more of the next is left out.  Who asked is told how each ended, and answers with those
+that are worth more; then rounds go over these of all contestants, so that what else runs on the
+machine disturbs all alike.  Runs in the peers' environment and needs nothing of Hamotor.
 """
 
 from __future__ import annotations
@@ -110,10 +110,14 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
     skipped = dict(job.get("skipped", ()))
     entries = []
     for index, contestant in enumerate(job.get("contestants", ())):
-        slow = 0
+        slow = failed = left_out = 0
         for number, setting in enumerate(contestant["settings"][: skipped.get(index)]):
+            if left_out:
+                left_out -= 1
+                continue
             at = {"index": index, "setting": number}
             yield at
+            began = time.perf_counter()
             try:
                 entry = Entry(at, _timed(job, contestant, setting, problem))
                 entry.run()
@@ -123,6 +127,9 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
                     entry.run()
             except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
                 yield {**at, "failure": str(problem_met)}
+                if time.perf_counter() - began > contestant["longest_s"]:
+                    failed += 1
+                    left_out = failed
                 continue
             entries.append(entry)
             slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
