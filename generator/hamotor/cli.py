@@ -673,9 +673,11 @@ def _test(parsed: argparse.Namespace) -> int:
 def _bench(parsed: argparse.Namespace) -> int:
     if parsed.what not in (None, *_BENCHMARKS):
         raise UsageError(
-            f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)};'
-            " scenes come after it, as in bench precision P1."
-            f"{suggest(parsed.what, _BENCHMARKS)}"
+            f'no benchmark "{parsed.what}"; there are {", ".join(_BENCHMARKS)}.'
+            + (
+                suggest(parsed.what, _BENCHMARKS)
+                or " Scenes come after it, as in bench precision P1."
+            )
         )
     if parsed.drift is not None and parsed.what != "precision":
         raise UsageError("--drift is for the long runs of bench precision.")
