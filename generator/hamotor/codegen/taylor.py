@@ -740,8 +740,8 @@ def _power_expression(x: Expression, exponent: Fraction) -> Expression:
 
 PACK = 8
 """Lanes of a pack."""
-MOST_PACKS, MOST_PRODUCTS = 2, 12
-"""Of coordinates, and of the packs of products: what registers hold."""
+MOST_PACKS, MOST_PRODUCTS = 4, 32
+"""Of coordinates, and of the packs of products: of more, permutations would take longest."""
 
 
 @dataclass(frozen=True)
@@ -857,7 +857,9 @@ def _packed(rows: list[list[tuple[Fraction, int, int]]]) -> tuple[PackedTerm, ..
         lanes = [*rows[PACK * pack : PACK * (pack + 1)]]
         lanes += [[]] * (PACK - len(lanes))
         for n in range(max(map(len, lanes))):
-            terms = [lane[n] if n < len(lane) else (Fraction(0), 0, 0) for lane in lanes]
+            # What has no weight reads what is read anyway.
+            _, *read = next(lane[n] for lane in lanes if n < len(lane))
+            terms = [lane[n] if n < len(lane) else (Fraction(0), *read) for lane in lanes]
             weights, left, right = zip(*terms, strict=True)
             found.append(PackedTerm(pack, left, right, weights))
     return tuple(found)

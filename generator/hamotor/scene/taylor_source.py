@@ -55,7 +55,7 @@ def recurrence_text(system: System, *, by_name: bool) -> str:
             }
         )
     entered = dict(renamed(flow.enter, places).outputs)
-    coordinates = PACK * packed.packs if packed else len(names)
+    coordinates = -(-len(names) // PACK) * PACK
     padding = coordinates - len(names)
     return rendered(
         "taylor.hpp.jinja",

@@ -39,8 +39,8 @@ class Adaptive {
                          const S& h) noexcept {
     failure_ = Failure::none;
     if (!(tolerance_ > S(0))) {
-      ahead_.method.do_step(system, state, t, h);
-      if constexpr (PoweredSystem<System>) work_ = ahead_.method.work();
+      method_.do_step(system, state, t, h);
+      if constexpr (PoweredSystem<System>) work_ = method_.work();
       ++tried_;
       ++taken_;
       return;
@@ -72,7 +72,7 @@ class Adaptive {
   }
 
   /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const auto& drift() const noexcept { return ahead_.method.drift(); }
+  [[nodiscard]] constexpr const auto& drift() const noexcept { return method_.drift(); }
 
   /// ∫ dH/dt dt over the time so far, J, by the method's own quadrature.
   [[nodiscard]] constexpr const S& work() const noexcept
@@ -95,7 +95,6 @@ class Adaptive {
   struct Mark {
     S time = S(0);
     StateOf<System> state{};
-    Method method{};
   };
 
   /// Takes `state` from t to the target, by steps that are those of h.
@@ -123,39 +122,72 @@ class Adaptive {
            state == delivered_;
   }
 
-  /// The first step: so short that neither a motor nor a momentum changes by more than a
-  /// hundredth.
+  /// The first step, about a third of what the tolerance will allow: with ω the largest rate of
+  /// anything, beside its size, by first or second derivatives, (100 e/ω)^(1/p)/ω, at most 1/ω.
   constexpr void start(const System& system, const StateOf<System>& state, const S& t,
                        const S& h) noexcept {
-    ahead_.time = t;
-    ahead_.state = state;
-    ahead_.method.forget();
-    const auto slope = detail::slope_of(system, state, t);
-    proposed_ = h;
-    for (std::size_t i = 0; i < System::bodies; ++i) {
-      shorten(detail::largest(state.motors[i]),
-              detail::largest(kinematics(state.motors[i], slope.rates[i])));
-      shorten(detail::largest(state.momenta[i]), detail::largest(slope.forces[i]));
-    }
+    ahead_ = {t, state};
     before_ = ahead_;
+    method_.forget();
+    const Change first = change(system, state, t);
+    S fastest = rate_of(state, first);
+    proposed_ = h;
+    if (!(fastest > S(0))) return;
+    const S little = scalar::sign(h) * (S(0.01) / fastest);
+    StateOf<System> there = state;
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      there.motors[i] = mul_add(little, first.motors[i], there.motors[i]);
+      there.momenta[i] = mul_add(little, first.momenta[i], there.momenta[i]);
+    }
+    Change turn = change(system, there, t + little);
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      turn.motors[i] = turn.motors[i] - first.motors[i];
+      turn.momenta[i] = turn.momenta[i] - first.momenta[i];
+    }
+    const S bend = scalar::sqrt(rate_of(state, turn) / scalar::abs(little));
+    fastest = select(bend > fastest, bend, fastest);
+    const S room = S(100) * tolerance_ / fastest;
+    const S part = scalar::rough_exp2(scalar::rough_log2(room) / S(Method::lower_order));
+    proposed_ = scalar::sign(h) * (select(part < S(1), part, S(1)) / fastest);
   }
 
-  constexpr void shorten(const S& size, const S& change) noexcept {
-    const S hundredth = S(0.01) * size;
-    if (hundredth > S(0) && scalar::abs(proposed_) * change > hundredth) {
-      proposed_ = scalar::sign(proposed_) * (hundredth / change);
+  using Change = ChangeOf<System>;
+
+  /// Ṁ and μ̇.
+  [[nodiscard]] static constexpr Change change(const System& system, const StateOf<System>& state,
+                                               const S& t) noexcept {
+    const auto slope = detail::slope_of(system, state, t);
+    Change result{{}, slope.forces};
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      result.motors[i] = kinematics(state.motors[i], slope.rates[i]);
     }
+    return result;
+  }
+
+  /// The largest change of a motor or a momentum beside it, s⁻¹; of what is 0, none.
+  [[nodiscard]] static constexpr S rate_of(const StateOf<System>& state,
+                                           const Change& by) noexcept {
+    S fastest(0);
+    const auto count = [&](const S& size, const S& gain) {
+      if (size > S(0)) fastest = scalar::max_abs(fastest, gain / size);
+    };
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      count(detail::largest(state.motors[i]), detail::largest(by.motors[i]));
+      count(detail::largest(state.momenta[i]), detail::largest(by.momenta[i]));
+    }
+    return fastest;
   }
 
   /// One step ahead, of whatever length is accepted; false where none can be that counts beside the
   /// time and h.
   [[nodiscard]] constexpr bool advance(const System& system, const S& h) noexcept {
+    const auto account = method_.account();
     for (bool refused = false;; refused = true) {
       Mark next = ahead_;
-      next.method.do_step(system, next.state, ahead_.time, proposed_);
+      method_.do_step(system, next.state, ahead_.time, proposed_);
       next.time = ahead_.time + proposed_;
       ++tried_;
-      const S ratio = next.method.error() / (tolerance_ * scalar::abs(proposed_));
+      const S ratio = method_.error() / (tolerance_ * scalar::abs(proposed_));
       S factor = factor_for(ratio);
       if (ratio <= S(1)) {
         before_ = ahead_;
@@ -165,6 +197,7 @@ class Adaptive {
         proposed_ = factor * proposed_;
         return true;
       }
+      method_.go_back(account);
       proposed_ = factor * proposed_;
       const S least = scalar::Limits<S>::epsilon() * scalar::max_abs(ahead_.time, h);
       if (!(scalar::abs(proposed_) > least)) {
@@ -179,13 +212,12 @@ class Adaptive {
                          const S& slack) noexcept {
     if (scalar::abs(ahead_.time - target) <= slack) {
       state = ahead_.state;
-      if constexpr (PoweredSystem<System>) work_ = ahead_.method.work();
+      if constexpr (PoweredSystem<System>) work_ = method_.work();
     } else {
-      Method& method = ahead_.method;
       const S at = (target - before_.time) / (ahead_.time - before_.time);
-      state = method.between(system, before_.state, before_.time, at);
+      state = method_.between(system, before_.state, before_.time, at);
       if constexpr (PoweredSystem<System>) {
-        work_ = method.work() - method.work_after(system, before_.state, before_.time, at);
+        work_ = method_.work() - method_.work_after(system, before_.state, before_.time, at);
       }
     }
     delivered_ = state;
@@ -196,13 +228,14 @@ class Adaptive {
   [[nodiscard]] static constexpr S factor_for(const S& ratio) noexcept {
     if (!(ratio - ratio == S(0))) return S(0.2);
     const S least = S(1) / S(1000000);
-    const S factor = S(0.9) * scalar::exp(scalar::log(select(ratio > least, ratio, least)) /
-                                          S(-Method::lower_order));
+    const S log_ratio = scalar::rough_log2(select(ratio > least, ratio, least));
+    const S factor = S(0.9) * scalar::rough_exp2(log_ratio / S(-Method::lower_order));
     return select(factor < S(0.2), S(0.2), select(factor > S(5), S(5), factor));
   }
 
-  Mark before_;  ///< where the last step began; its method is not used
+  Mark before_;  ///< where the last step began
   Mark ahead_;   ///< where it ended: at the delivered time or later
+  Method method_{};
   StateOf<System> delivered_{};
   S delivered_time_ = S(0);
   S tolerance_ = S(0);

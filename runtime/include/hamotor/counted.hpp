@@ -86,6 +86,13 @@ class Counted {
     return std::fma(a.value_, b.value_, c.value_);
   }
 
+  static Counted rough_log2(const Counted& x) noexcept {
+    return count(functions, scalar::rough_log2(x.value_));
+  }
+  static Counted rough_exp2(const Counted& x) noexcept {
+    return count(functions, scalar::rough_exp2(x.value_));
+  }
+
   static constexpr void note_evaluations(std::int64_t times) noexcept {
     if (!std::is_constant_evaluated()) counts[evaluations] += times;
   }

@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "hamotor/compensated.hpp"
+#include "hamotor/packed_series.hpp"
 #include "hamotor/runge_kutta_pairs.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/state.hpp"
@@ -60,6 +61,19 @@ template <class System>
   return slope;
 }
 
+/// Σ c_r x_r over r < count; terms without weight are left out.
+template <class S, std::size_t n, std::size_t most>
+[[nodiscard]] constexpr std::array<S, n> weighted_sum(const S* c,
+                                                      const std::array<std::array<S, n>, most>& x,
+                                                      std::size_t count) noexcept {
+  std::array<S, n> sum{};
+  for (std::size_t r = 0; r < count; ++r) {
+    if (c[r] == S(0)) continue;
+    for (std::size_t i = 0; i < n; ++i) sum[i] = mul_add(c[r], x[r][i], sum[i]);
+  }
+  return sum;
+}
+
 /// A motor within a step as M₀ exp X, by X.
 struct ExponentialChart {
   template <class G, class S>
@@ -70,12 +84,6 @@ struct ExponentialChart {
   template <class Motor, class Rate>
   [[nodiscard]] static constexpr Motor moved(const Motor& start, const Rate& x) noexcept {
     return gp(start, exp(x));
-  }
-
-  /// Ẋ of Ṁ = M B at X = 0.
-  template <class Motor, class Rate>
-  [[nodiscard]] static constexpr Rate first_slope(const Motor& /*start*/, const Rate& b) noexcept {
-    return b;
   }
 
   /// Ẋ of Ṁ = M B, to the order of a method.
@@ -102,11 +110,6 @@ struct Components {
   template <class Motor>
   [[nodiscard]] static constexpr Motor moved(const Motor& start, const Motor& by) noexcept {
     return start + by;
-  }
-
-  template <class Motor, class Rate>
-  [[nodiscard]] static constexpr Motor first_slope(const Motor& start, const Rate& b) noexcept {
-    return kinematics(start, b);
   }
 
   template <int /*order*/, class Motor, class Rate>
@@ -187,6 +190,40 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
     S power{};
   };
 
+  /// The numbers of a sum one after the other, for whole packs where there are any.
+  static constexpr std::size_t numbers =
+      n * (std::tuple_size_v<decltype(Change{}.components())> +
+           std::tuple_size_v<decltype(Momenta{}[0].components())>)+(PoweredSystem<System> ? 1 : 0);
+  using Row = std::array<S, detail::has_packs<S> ? (numbers + 7) / 8 * 8 : numbers>;
+
+  static constexpr void put(Row& row, const Sum& sum) noexcept {
+    std::size_t at = 0;
+    const auto put_all = [&](const auto& parts) {
+      for (const auto& part : parts) {
+        for (const S& x : part.components()) row[at++] = x;
+      }
+    };
+    put_all(sum.motors);
+    put_all(sum.forces);
+    if constexpr (PoweredSystem<System>) row[at] = sum.power;
+  }
+
+  [[nodiscard]] static constexpr Sum taken(const Row& row) noexcept {
+    Sum sum{};
+    std::size_t at = 0;
+    const auto take_all = [&](auto& parts) {
+      for (auto& part : parts) {
+        auto x = part.components();
+        for (S& component : x) component = row[at++];
+        part = std::remove_reference_t<decltype(part)>::from(x);
+      }
+    };
+    take_all(sum.motors);
+    take_all(sum.forces);
+    if constexpr (PoweredSystem<System>) sum.power = row[at];
+    return sum;
+  }
+
   /// The pair's numbers, rounded to S once.
   struct Table {
     std::array<std::array<S, all_stages>, all_stages> rows{};
@@ -210,48 +247,32 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
   constexpr void find_slopes(const System& system, const StateOf<System>& start, const S& t,
                              std::size_t count) noexcept {
     for (std::size_t s = known_; s < count; ++s) {
-      Sum& slope = slopes_[s];
-      if (s == 0) {
-        const auto now = detail::slope_of(system, start, t);
-        slope.forces = now.forces;
-        slope.power = now.power;
-        for (std::size_t i = 0; i < n; ++i) {
-          slope.motors[i] = Coordinates::first_slope(start.motors[i], now.rates[i]);
-        }
-        continue;
-      }
-      const Sum sum = combined(table.rows[s], s);
+      const Sum by = combined(table.rows[s].data(), s);
       StateOf<System> there = start;
       for (std::size_t i = 0; i < n; ++i) {
-        there.momenta[i] = start.momenta[i] + sum.forces[i];
-        there.motors[i] = Coordinates::moved(start.motors[i], sum.motors[i]);
+        there.momenta[i] = start.momenta[i] + by.forces[i];
+        there.motors[i] = Coordinates::moved(start.motors[i], by.motors[i]);
       }
       const auto now = detail::slope_of(system, there, mul_add(table.nodes[s], h_, t));
-      slope.forces = now.forces;
-      slope.power = now.power;
+      Sum slope{{}, now.forces, now.power};
       for (std::size_t i = 0; i < n; ++i) {
         slope.motors[i] =
-            Coordinates::template slope<order>(there.motors[i], sum.motors[i], now.rates[i]);
+            Coordinates::template slope<order>(there.motors[i], by.motors[i], now.rates[i]);
       }
+      put(slopes_[s], slope);
     }
     if (known_ < count) known_ = count;
   }
 
   /// h Σ c_r slope_r over the first `count` stages.
+  [[nodiscard]] constexpr Sum combined(const S* c, std::size_t count) const noexcept {
+    Row sum = detail::weighted_sum(c, slopes_, count);
+    for (S& x : sum) x = h_ * x;
+    return taken(sum);
+  }
   template <std::size_t size>
-  [[nodiscard]] constexpr Sum combined(const std::array<S, size>& c,
-                                       std::size_t count = size) const noexcept {
-    Sum sum{};
-    for (std::size_t r = 0; r < count; ++r) {
-      if (c[r] == S(0)) continue;
-      const S by = h_ * c[r];
-      for (std::size_t i = 0; i < n; ++i) {
-        sum.motors[i] = mul_add(by, slopes_[r].motors[i], sum.motors[i]);
-        sum.forces[i] = mul_add(by, slopes_[r].forces[i], sum.forces[i]);
-      }
-      if constexpr (PoweredSystem<System>) sum.power = mul_add(by, slopes_[r].power, sum.power);
-    }
-    return sum;
+  [[nodiscard]] constexpr Sum combined(const std::array<S, size>& c) const noexcept {
+    return combined(c.data(), size);
   }
 
   [[nodiscard]] static constexpr StateOf<System> moved(const StateOf<System>& start,
@@ -277,7 +298,7 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
     return worst;
   }
 
-  std::array<Sum, all_stages> slopes_{};
+  alignas(64) std::array<Row, all_stages> slopes_{};
   std::size_t known_ = 0;  ///< how many of them
   S h_{};
   S error_ = S(0);

@@ -5,10 +5,12 @@
 // stands here, once, so that a scalar type is adapted in one place.
 #pragma once
 
+#include <bit>
 #include <cfloat>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <string_view>
 #include <type_traits>
@@ -478,6 +480,41 @@ template <class S, std::same_as<S>... Rest>
   } else {
     const S others = max_abs(rest...);
     return select(larger > others, larger, others);
+  }
+}
+
+/// log₂ x of an x > 0 within 0.09, a large number if x is none: between powers of two a straight
+/// line.  For lengths of steps: what is chosen by it is the same with every compiler and library.
+template <class S>
+[[nodiscard]] constexpr S rough_log2(const S& x) noexcept {
+  if constexpr (std::is_same_v<S, double>) {
+    return mul_add(static_cast<double>(std::bit_cast<std::int64_t>(x)), 0x1p-52, -1023.0);
+  } else if constexpr (std::is_same_v<S, float>) {
+    return static_cast<float>(rough_log2(static_cast<double>(x)));
+  } else if constexpr (requires { S::rough_log2(x); }) {
+    return S::rough_log2(x);
+  } else {
+    return log(x) / log(S(2));
+  }
+}
+
+/// 2ˣ within a part of 2e-4, of x from −1022 to 1023; for the same.
+template <class S>
+[[nodiscard]] constexpr S rough_exp2(const S& x) noexcept {
+  if constexpr (std::is_same_v<S, double>) {
+    const double above = select(x > -1022, x, -1022.0);
+    const double within = select(above < 1023, above, 1023.0);
+    const int whole = static_cast<int>(within + 1023);
+    const double t = within + 1023 - whole;
+    const double power = std::bit_cast<double>(static_cast<std::uint64_t>(whole) << 52);
+    const double bend = mul_add(t, -0.07924492, -0.30410988);
+    return power * mul_add(t * (1 - t), bend, 1 + t);
+  } else if constexpr (std::is_same_v<S, float>) {
+    return static_cast<float>(rough_exp2(static_cast<double>(x)));
+  } else if constexpr (requires { S::rough_exp2(x); }) {
+    return S::rough_exp2(x);
+  } else {
+    return exp(x * log(S(2)));
   }
 }
 

@@ -120,18 +120,31 @@ class ExplicitMethod {
   /// Whether sums over steps are compensated.
   static constexpr bool compensated = summation == Summation::compensated;
 
+  /// What is carried from step to step.
+  struct Account {
+    [[no_unique_address]] LowDigits<System, summation> low;
+    Drift<S> drift;
+    S work{};
+  };
+
   /// How far the steps so far left the group.
-  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return drift_; }
+  [[nodiscard]] constexpr const Drift<S>& drift() const noexcept { return account_.drift; }
 
   /// ∫ dH/dt dt over the steps so far, J, by the method's own quadrature.
   [[nodiscard]] constexpr const S& work() const noexcept
     requires PoweredSystem<System>
   {
-    return work_;
+    return account_.work;
   }
 
+  /// Of the steps so far.
+  [[nodiscard]] constexpr const Account& account() const noexcept { return account_; }
+
+  /// The steps since this account are as if they had not been.
+  constexpr void go_back(const Account& account) noexcept { account_ = account; }
+
   /// The next step is from another state: what sums lost of the last one is nothing to it.
-  constexpr void forget() noexcept { low_ = {}; }
+  constexpr void forget() noexcept { account_.low = {}; }
 
  protected:
   /// Multiplies motors by exp X, for each X in turn, and adds `by` times what pushes the momenta
@@ -182,7 +195,7 @@ class ExplicitMethod {
         changes.motors[i] = change(i);
         changes.momenta[i] = by * forces[i];
       }
-      record(drift_, low_.add(state, changes));
+      record(account_.drift, account_.low.add(state, changes));
     } else {
       std::array<S, n> defects{};
       for (std::size_t i = 0; i < n; ++i) {
@@ -192,14 +205,12 @@ class ExplicitMethod {
         motor = motor + unit_correction(motor, defect);
         state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
       }
-      record(drift_, defects);
+      record(account_.drift, defects);
     }
-    if constexpr (PoweredSystem<System>) work_ = mul_add(by, power, work_);
+    if constexpr (PoweredSystem<System>) account_.work = mul_add(by, power, account_.work);
   }
 
-  [[no_unique_address]] LowDigits<System, summation> low_;
-  Drift<S> drift_;
-  S work_{};
+  Account account_;
 };
 
 }  // namespace detail

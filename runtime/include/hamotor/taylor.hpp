@@ -40,14 +40,13 @@ struct SeriesRows {
 };
 #ifdef HAMOTOR_PACKS
 template <class Recurrence, class S, std::size_t lanes, std::size_t orders>
+  requires(has_packs<S> && !is_packed<Recurrence, S>)
+struct SeriesRows<Recurrence, S, lanes, orders> : CauchySums<S, lanes / 8, orders> {};
+template <class Recurrence, class S, std::size_t lanes, std::size_t orders>
   requires is_packed<Recurrence, S>
 struct SeriesRows<Recurrence, S, lanes, orders>
     : PackedSeries<typename Recurrence::Packed, S, orders> {};
 #endif
-
-}  // namespace detail
-
-namespace detail {
 
 /// The order of a series that is to be as accurate as numbers of so many bits.
 [[nodiscard]] constexpr int series_order(int bits) noexcept { return 7 + (bits + 1) / 2; }
@@ -70,11 +69,10 @@ class Taylor {
   using S = typename System::Scalar;
   using Recurrence = RecurrenceOf<System>;
   using Coordinates = typename Recurrence::Coordinates;
-  static constexpr std::size_t n = Recurrence::coordinates;
+  static constexpr std::size_t n = Recurrence::coordinates;  // whole packs
   static constexpr std::size_t bodies = System::bodies;
-  /// Lanes in a block of sums, which registers hold.
-  static constexpr std::size_t block = 16;
-  static constexpr std::size_t lanes = (Recurrence::lanes + block - 1) / block * block;
+  static constexpr std::size_t lanes =
+      detail::has_packs<S> ? (Recurrence::lanes + 7) / 8 * 8 : Recurrence::lanes;
   static constexpr bool is_powered = requires { Recurrence::work; };
 
  public:
@@ -88,7 +86,7 @@ class Taylor {
   /// only, in every step, where it is not positive or a step would have to be better than that.
   constexpr void set_tolerance(const S& tolerance) noexcept {
     tolerance_ = select(tolerance > S(0), tolerance, S(0));
-    if (tolerance_ > S(0)) log_tolerance_ = scalar::log(tolerance_);
+    if (tolerance_ > S(0)) log_tolerance_ = scalar::rough_log2(tolerance_);
     int bits = 0;
     for (S x = tolerance_; x < S(1) && bits < scalar::Limits<S>::digits; x = x + x) ++bits;
     length_ = detail::series_order(bits);
@@ -116,6 +114,7 @@ class Taylor {
     for (std::size_t i = 0; i < n; ++i) x[i] = x[i] + (change[i] + low_[i]);
     if constexpr (is_powered) work_ = work_before_ + x[Recurrence::work];
     state = Recurrence::leave(x);
+    state.motors = corrected(state.motors);
     delivered_ = state;
   }
 
@@ -165,43 +164,46 @@ class Taylor {
     known_ = true;
     coefficients_[0] = Recurrence::enter(state, t);
     low_ = {};
+    defects_ = {};
     offset_ = S(0);
     if constexpr (is_powered) work_before_ = work_;
     expand();
   }
 
   /// Moves the centre of the expansion.
+  ///
+  /// What motors lack before a step they lack after it, as (M q)(M q)~ = M M~.  Found before, it
+  /// waits for none of the step's parts.
   constexpr void advance(const S& step) noexcept {
-    const Coordinates change = increment(step);
     Coordinates& x = coefficients_[0];
-    for (std::size_t i = 0; i < n; ++i) {
-      const auto sum = scalar::two_sum(x[i], change[i] + low_[i]);
-      x[i] = sum.hi;
-      if constexpr (compensated) low_[i] = sum.lo;
-    }
-    S worst(0);
-    auto motors = Recurrence::leave(x).motors;
-    for (auto& motor : motors) {
-      const auto defect = unit_defect(motor);
-      worst = scalar::max_abs(worst, detail::size(defect));
-      motor = motor + unit_correction(motor, defect);
-    }
+    detail::add_compensated(x, low_, increment(step));
+    if constexpr (!compensated) low_ = {};
+    const Motors motors = corrected(Recurrence::leave(x).motors);
     Recurrence::replace_motors(x, motors);
     Recurrence::refresh(x);
     for (std::size_t i = 0; i < n; ++i) low_[i] = select(Recurrence::follows[i], S(0), low_[i]);
+    S worst(0);
+    for (std::size_t i = 0; i < bodies; ++i) {
+      defects_[i] = unit_defect(motors[i]);
+      worst = scalar::max_abs(worst, detail::size(defects_[i]));
+    }
     detail::record(drift_, worst);
     expand();
   }
 
+  using Motors = decltype(StateOf<System>::motors);
+
+  /// Put back on the group by what was lacking at the centre.
+  [[nodiscard]] constexpr Motors corrected(Motors motors) const noexcept {
+    for (std::size_t i = 0; i < bodies; ++i) {
+      motors[i] = motors[i] + unit_correction(motors[i], defects_[i]);
+    }
+    return motors;
+  }
+
   /// x(offset) − x(0).
   [[nodiscard]] constexpr Coordinates increment(const S& offset) const noexcept {
-    const S units = offset / unit_;
-    Coordinates sum = coefficients_[static_cast<std::size_t>(length_)];
-    for (std::size_t k = static_cast<std::size_t>(length_) - 1; k > 0; --k) {
-      for (std::size_t i = 0; i < n; ++i) sum[i] = mul_add(sum[i], units, coefficients_[k][i]);
-    }
-    for (std::size_t i = 0; i < n; ++i) sum[i] = sum[i] * units;
-    return sum;
+    return detail::sum_of_powers(coefficients_, static_cast<std::size_t>(length_), offset / unit_);
   }
 
   /// Expands about coefficients_[0], again where the unit turns out to be far from the reach.
@@ -245,9 +247,7 @@ class Taylor {
   }
 
   [[nodiscard]] constexpr bool is_finite(std::size_t k) const noexcept {
-    bool result = true;
-    for (const S& x : coefficients_[k]) result &= x - x == S(0);
-    return result;
+    return detail::are_finite(coefficients_[k]);
   }
 
   [[nodiscard]] constexpr bool is_moving(std::size_t k) const noexcept {
@@ -255,36 +255,58 @@ class Taylor {
     return std::any_of(found.begin(), found.end(), [](const S& x) { return x > S(0); });
   }
 
-  constexpr void expand_node_by_node() noexcept {
+  [[gnu::flatten]] constexpr void expand_node_by_node() noexcept {
     typename Recurrence::Known known{};
-    Coordinates change{};
-    Row sums{};
-    Recurrence::first(coefficients_[0], known, change);
-    for (std::size_t i = 0; i < n; ++i) coefficients_[1][i] = unit_ * change[i];
-    for (std::size_t k = 1; k < static_cast<std::size_t>(length_); ++k) {
-      add_products(k, sums);
+    alignas(64) Row sums{};
+    Recurrence::first(coefficients_[0], known, unit_, coefficients_[1]);
+    const auto p = static_cast<std::size_t>(length_);
+    const auto next = [&](std::size_t k) {
       const S over = S(1) / S(static_cast<int>(k));
-      Recurrence::next(S(static_cast<int>(k)), over, coefficients_[k], known, sums.data(),
-                       rows_.u[k].data(), rows_.v[k].data(), change);
       const S over_next = unit_ / S(static_cast<int>(k + 1));
-      for (std::size_t i = 0; i < n; ++i) coefficients_[k + 1][i] = over_next * change[i];
+      Recurrence::next(S(static_cast<int>(k)), over, coefficients_[k], known, sums.data(),
+                       rows_.u[k].data(), rows_.v[k].data(), over_next, coefficients_[k + 1]);
+    };
+#ifdef HAMOTOR_PACKS
+    if constexpr (detail::has_packs<S>) {
+      using Sums = typename decltype(rows_)::Rows;
+      const auto put = [&](const Sums& found) {
+        for (std::size_t t = 0; t < lanes / 8; ++t) {
+          detail::store<S>(sums.data() + 8 * t, found[t]);
+        }
+      };
+      for (std::size_t k = 1; k < p; k += 2) {
+        Sums found{};
+        Sums later{};
+        if (k > 1) {
+          rows_.add_inner(k, found, later);
+          rows_.add(1, k - 1, found);
+          rows_.add(k - 1, 1, found);
+        }
+        put(found);
+        next(k);
+        if (k + 1 == p) return;
+        rows_.add(1, k, later);
+        if (k > 1) rows_.add(k, 1, later);
+        put(later);
+        next(k + 1);
+      }
+      return;
+    }
+#endif
+    for (std::size_t k = 1; k < p; ++k) {
+      add_products(k, sums);
+      next(k);
     }
   }
 
   /// Σ u_j v_{k−j} over 0 < j < k, the newest coefficients last.
   constexpr void add_products(std::size_t k, Row& sums) const noexcept {
-    for (std::size_t first = 0; first < lanes; first += block) {
-      std::array<S, block> sum{};
-      for (std::size_t j = k / 2; j > 0; --j) {
-        const S* u = rows_.u[j].data() + first;
-        const S* v = rows_.v[k - j].data() + first;
-        for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
-        if (k - j == j) continue;
-        u = rows_.u[k - j].data() + first;
-        v = rows_.v[j].data() + first;
-        for (std::size_t l = 0; l < block; ++l) sum[l] = mul_add(u[l], v[l], sum[l]);
+    sums = {};
+    for (std::size_t j = k / 2; j > 0; --j) {
+      for (std::size_t l = 0; l < lanes; ++l) {
+        sums[l] = mul_add(rows_.u[j][l], rows_.v[k - j][l], sums[l]);
+        if (k - j != j) sums[l] = mul_add(rows_.u[k - j][l], rows_.v[j][l], sums[l]);
       }
-      for (std::size_t l = 0; l < block; ++l) sums[first + l] = sum[l];
     }
   }
 
@@ -303,34 +325,47 @@ class Taylor {
     return result;
   }
 
+  /// 1 / the size of every coordinate's kind, which is what they have or reach within `span`; 0 for
+  /// coordinates that are not compared.
+  [[nodiscard]] constexpr Coordinates scales(const S& span) const noexcept {
+    Coordinates scale =
+        detail::sizes_within(coefficients_[0], coefficients_[1], coefficients_[2], span);
+    Sizes over{};
+    for (std::size_t i = 0; i < n; ++i) {
+      if (Recurrence::parts[i] < 0) continue;
+      S& largest = over[static_cast<std::size_t>(Recurrence::parts[i])];
+      largest = select(largest > scale[i], largest, scale[i]);
+    }
+    for (S& x : over) x = select(x > S(0), S(1) / x, S(0));
+    for (std::size_t i = 0; i < n; ++i) {
+      scale[i] =
+          Recurrence::parts[i] < 0 ? S(0) : over[static_cast<std::size_t>(Recurrence::parts[i])];
+    }
+    return scale;
+  }
+
   /// The step, in units, whose last three terms stay below the tolerance times the size of the
   /// coordinates, which is what they have or reach within a step as long as the last one.
   [[nodiscard]] constexpr S reach_of_coefficients() const noexcept {
     const auto p = static_cast<std::size_t>(length_);
-    const S span = steps_ > 1 && reach_ < unlimited() ? reach_ / unit_ : radius(p) / S(8);
-    const Sizes at_0 = sizes(0);
-    const Sizes at_1 = sizes(1);
-    const Sizes at_2 = sizes(2);
-    const S log_tolerance = tolerance_ > S(0) ? log_tolerance_ + scalar::log(unit_) : S(0);
+    const Coordinates scale =
+        scales(steps_ > 1 && reach_ < unlimited() ? reach_ / unit_ : radius(p) / S(8));
+    const S log_epsilon(1 - scalar::Limits<S>::digits);
+    const S log_tolerance = log_tolerance_ + scalar::rough_log2(unit_);
     S shortest = unlimited();
     for (std::size_t m = p - 2; m <= p; ++m) {
-      const Sizes last = sizes(m);
-      S ratio(0);
-      for (std::size_t g = 0; g < kinds; ++g) {
-        const S size = scalar::max_abs(at_0[g], at_1[g] * span, at_2[g] * span * span);
-        if (size > S(0)) ratio = scalar::max_abs(ratio, last[g] / size);
-      }
+      const S ratio = detail::largest_product(coefficients_[m], scale);
       if (!(ratio > S(0))) continue;
       // r hᵐ ≤ ε, or, if that is longer, r hᵐ ≤ e h.
-      const S log_ratio = scalar::log(ratio);
-      S exponent = (log_epsilon_ - log_ratio) / S(static_cast<int>(m));
+      const S log_ratio = scalar::rough_log2(ratio);
+      S exponent = (log_epsilon - log_ratio) * (S(1) / S(static_cast<int>(m)));
       if (tolerance_ > S(0)) {
-        const S asked = (log_tolerance - log_ratio) / S(static_cast<int>(m) - 1);
+        const S asked = (log_tolerance - log_ratio) * (S(1) / S(static_cast<int>(m) - 1));
         exponent = select(asked > exponent, asked, exponent);
       }
       shortest = select(shortest > exponent, exponent, shortest);
     }
-    return select(shortest < unlimited(), scalar::exp(shortest), unlimited());
+    return select(shortest < unlimited(), scalar::rough_exp2(shortest), unlimited());
   }
 
   /// Of convergence, about, in units, from coefficients of up to order p.
@@ -342,7 +377,8 @@ class Taylor {
         const Sizes last = sizes(m);
         for (std::size_t g = 0; g < kinds; ++g) {
           if (!(first[g] > S(0)) || !(last[g] > S(0))) continue;
-          const S r = scalar::exp(scalar::log(first[g] / last[g]) / S(static_cast<int>(m - j)));
+          const S r = scalar::rough_exp2(scalar::rough_log2(first[g] / last[g]) /
+                                         S(static_cast<int>(m - j)));
           shortest = select(shortest > r, r, shortest);
         }
       }
@@ -353,10 +389,10 @@ class Taylor {
   alignas(64) std::array<Coordinates, static_cast<std::size_t>(order) + 1> coefficients_{};
   detail::SeriesRows<Recurrence, S, lanes, static_cast<std::size_t>(order) + 1> rows_;
   Coordinates low_{};
+  std::array<decltype(unit_defect(typename StateOf<System>::Element{})), bodies> defects_{};
   StateOf<System> delivered_{};
   S tolerance_ = S(0);
   S log_tolerance_ = S(0);
-  S log_epsilon_ = scalar::log(scalar::Limits<S>::epsilon());
   S unit_ = S(1);
   S reach_ = S(0);
   S offset_ = S(0);
