@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 import pytest
-from tests.generator.toy import toy, toy_state
+from tests.generator.toy import RATE, toy, toy_state
 
 from hamotor.errors import NumericsError, UsageError
 from hamotor.run import runner, tolerance
@@ -199,6 +199,18 @@ def test_a_tolerance_below_rounding_is_refused_with_what_can_be_reached() -> Non
         toy().run(end=1.0, tolerance=1e-30)
     assert caught.value.run.status == "failed"
     assert caught.value.run.t[-1] == pytest.approx(1.0)
+
+
+def test_the_same_run_once_more_verifies_nothing() -> None:
+    simulation = toy({"CONTROLLED": '"true"'}, method="euler")
+    run = simulation.run(tolerance=1e-12)
+    said = run.report["tolerance"]
+    first, again, nudged = (rung["difference"] for rung in said["ladder"])
+    assert (first, again) == (None, 0)
+    assert 1e-16 < nudged == said["achieved"] < 1e-12
+    assert run.momentum()[0, 2] == RATE, "of the runs, the one from the start that was given"
+    with pytest.raises(RunFailed, match=r"a start some roundings away ends .* scalar of more"):
+        simulation.run(tolerance=1e-17)
 
 
 def test_the_cap_on_halvings_is_an_error(

@@ -5,6 +5,7 @@
 // OVERFLOW_AT n    an observed quantity, not the state, becomes infinite after step n
 // FAIL_MEMBER n    members of an ensemble with a negative rate fail in step n
 // SLEEP_US n       every step takes at least n microseconds
+// CONTROLLED "true"  euler says that it chooses its steps, but takes the same for any tolerance
 #include <chrono>
 #include <cmath>
 #include <cstdint>
@@ -21,6 +22,9 @@
 #endif
 #ifndef SLEEP_US
 #define SLEEP_US 0
+#endif
+#ifndef CONTROLLED
+#define CONTROLLED "false"
 #endif
 #ifndef FAIL_MEMBER
 #define FAIL_MEMBER -1
@@ -89,7 +93,8 @@ void write_row(const Run& run, double* row) {
 EXPORT const char* hamotor_describe() {
   return R"({"abi": )" ABI R"(, "scene": "toy", "algebra": "pga3", "group": "SE3",
  "scalar": "double", "digits": 17, "kernels": "generated", "compiler": "toy", "fma": false, "bodies": ["bob"],
- "methods": [{"name": "splitting2", "order": 2, "error_controlled": false}, {"name": "euler", "order": 1, "error_controlled": false}],
+ "methods": [{"name": "splitting2", "order": 2, "error_controlled": false}, {"name": "euler", "order": 1, "error_controlled": )" CONTROLLED
+         R"(}],
  "motor": ["s","e23","e31","e12","e01","e02","e03","e0123"],
  "momentum": ["e23","e31","e12","e01","e02","e03"],
  "columns": [{"name":"t","unit":"s","frame":"","body":""},

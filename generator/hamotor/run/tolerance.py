@@ -1,7 +1,9 @@
 """A global error target: runs of ever smaller error until two of them agree.
 
 The error of a run is estimated by one of half the step, or, with a method that chooses its steps,
-of a sixteenth of the local tolerance.  The order of the method says where to go from there.
+of a sixteenth of the local tolerance.  The order of the method says where to go from there.  Where
+such a method's steps are as exact as its numbers, a smaller tolerance gives the same run again,
+which verifies nothing: then one from a start some roundings away says what rounding does.
 """
 
 from __future__ import annotations
@@ -69,6 +71,8 @@ def meet_tolerance(
     component, the sign of M fixed) and |Δμ| over the norm of the initial momentum.  The finer run
     of the last pair is returned with its recorder; the others are discarded.
 
+    Where a smaller local tolerance changes nothing, the second starts some roundings away.
+
     Status "failed" with the reason in `problem` when rounding, chaos, the number of runs or
     `deadline` (of `time.perf_counter`) comes first.  A run that the time left would not suffice for
     is not begun.  `every` None keeps about two thousand rows, unless there are `times`.
@@ -85,7 +89,7 @@ def meet_tolerance(
         recorder = new_recorder()
         outcome = integrate(
             library,
-            state,
+            climb.start,
             climb.plan,
             recorder,
             progress=progress,
@@ -122,6 +126,8 @@ class _Climb:
         self.description = description
         self.method, self.end, self.target = method, end, tolerance
         self.every, self.times = every, times
+        self.start = state
+        self.nudged = False
         self.controlled = method in description.error_controlled
         order = description.methods[method] or _ORDER_OF_EXACT
         self.order = 1.0 if self.controlled else float(order)
@@ -151,6 +157,8 @@ class _Climb:
     @property
     def stage(self) -> str:
         """The next rung, for people."""
+        if self.nudged:
+            return "from a start some roundings away"
         if self.controlled:
             return f"local tolerance {self.knob:.3g}"
         return f"step {abs(self.plan.step):.3g} s"
@@ -190,27 +198,42 @@ class _Climb:
         why = outcome.breakdown.reason if outcome.breakdown else ""
         late = why == "time_limit"
         too_fine = why == "step_too_short"
-        if self.best is not None and (late or too_fine or outcome.status == "interrupted"):
+        if self.best is not None and (
+            self.nudged or late or too_fine or outcome.status == "interrupted"
+        ):
             # A whole run with a longer step says more than a part of the next one.
             recorder.discard()
         else:
             if self.best is not None:
                 self.best[1].discard()
             self.best = outcome, recorder
-            self.achieved = difference
+        self.achieved = difference if outcome.status == "finished" else self.achieved
         if outcome.status == "interrupted":
             return "interrupted"
+        if difference == 0 and self._same_steps() and not self.nudged:
+            self.start, self.nudged = _nudged(self.start, self.description.digits), True
+            return None
         if difference is not None and difference <= self.target:
             return "finished"
         if late:
             self.reason = "the time limit passed."
         elif too_fine:
             self.reason = outcome.problem
+        elif self.nudged and difference is not None:
+            self.reason = (
+                "shorter steps change nothing any more, and a start some roundings away ends "
+                f"{difference:.2g} away. The motion amplifies rounding errors: ask for no less, "
+                "end it earlier, or take a scalar of more digits."
+            )
         else:
             self.reason = _hopeless(self.rungs)
         if not self.reason:
             self._turn_down(difference)
         return "failed" if self.reason else None
+
+    def _same_steps(self) -> bool:
+        """Whether the last two runs took the same steps, however different what was asked."""
+        return self.controlled and self.rungs[-1].steps == self.rungs[-2].steps
 
     def _turn_down(self, difference: float | None) -> None:
         """Set the next rung: a check of the last one, or as far as the order says it is to go."""
@@ -259,6 +282,13 @@ class _Climb:
             replace(outcome, status=status, problem=problem, breakdown=breakdown, ladder=ladder),
             recorder,
         )
+
+
+def _nudged(state: Sequence[float | Fraction] | Vector, digits: int) -> Sequence[float | Fraction]:
+    """A state some roundings away: as far as they may bring it in a hundred steps."""
+    relative = Fraction(1, 10 ** (digits - 2))
+    moved = [Fraction(x) * (1 + (-1) ** k * relative) for k, x in enumerate(state)]
+    return [type(x)(y) for x, y in zip(state, moved, strict=True)]
 
 
 def _hopeless(rungs: Sequence[Rung]) -> str:
