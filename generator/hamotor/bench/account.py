@@ -78,13 +78,6 @@ class Progress:
         say(", ".join(filter(None, parts)))
 
 
-def write_whole(file: Path, text: str) -> None:
-    """Write a file so that whoever reads it sees the old text or the new one."""
-    unfinished = file.with_name(f".{os.getpid()}-{file.name}")
-    unfinished.write_text(text, encoding="utf-8")
-    unfinished.replace(file)
-
-
 def publish(
     account: Mapping[str, Any],
     table: Callable[[Mapping[str, Any]], str],

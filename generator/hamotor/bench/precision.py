@@ -29,7 +29,6 @@ from hamotor.bench.account import (
     provenance,
     publish,
     say,
-    write_whole,
 )
 from hamotor.bench.contest import (
     GIVEN,
@@ -57,6 +56,7 @@ from hamotor.bench.precision_report import (
 )
 from hamotor.bench.problems import GOALS, TARGETS, Problem, own_problems, problem
 from hamotor.errors import HamotorError, ToolError, UsageError
+from hamotor.files import write_whole
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.library import SceneLibrary
 from hamotor.run.report import to_json

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -11,9 +10,9 @@ from pathlib import Path
 from statistics import median
 from typing import Any, Final
 
-from hamotor.bench.account import write_whole
 from hamotor.bench.endpoint import ATTITUDE
 from hamotor.bench.solvers import TUNED
+from hamotor.files import whole, write_whole
 from hamotor.run.report import to_json
 
 Rows = Sequence[Mapping[str, Any]]
@@ -368,9 +367,8 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
     ax.set_title(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
     figure.legend(loc="outside right upper", fontsize=8, frameon=False)
     for file in files:
-        unfinished = file.with_name(f".{os.getpid()}-{file.name}")
-        figure.savefig(unfinished, dpi=150, format=file.suffix[1:])
-        unfinished.replace(file)
+        with whole(file) as unfinished:
+            figure.savefig(unfinished, dpi=150, format=file.suffix[1:])
     return files
 
 

@@ -16,10 +16,11 @@ from typing import Any, Final
 import numpy as np
 
 from hamotor.bench import endpoint
-from hamotor.bench.account import say, write_whole
+from hamotor.bench.account import say
 from hamotor.bench.endpoint import ATTITUDE, POSITION, Endpoint
 from hamotor.bench.equations import Equations, equations
 from hamotor.errors import HamotorError, UsageError
+from hamotor.files import write_whole
 from hamotor.run.build import default_cache, default_includes, headers_digest
 from hamotor.run.library import Description, SceneLibrary
 from hamotor.run.report import to_json

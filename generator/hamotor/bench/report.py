@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+from hamotor.files import whole
 
 BASELINE = "Eigen"
 CONVERTED = "Eigen Isometry3, converted"
@@ -132,9 +133,8 @@ def draw_ratios(account: Mapping[str, Any], file: Path) -> None:
         for c in compilers
     ]
     figure.legend(handles=patches, loc="outside lower center", ncols=5, frameon=False)
-    unfinished = file.with_name(f".{os.getpid()}-{file.name}")
-    figure.savefig(unfinished, dpi=150, format="png")
-    unfinished.replace(file)
+    with whole(file) as unfinished:
+        figure.savefig(unfinished, dpi=150, format="png")
 
 
 def _draw_operation(

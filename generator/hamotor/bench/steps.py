@@ -16,8 +16,9 @@ from pathlib import Path
 from statistics import geometric_mean
 from typing import Any, Final
 
-from hamotor.bench.account import provenance, publish, say, write_whole
+from hamotor.bench.account import provenance, publish, say
 from hamotor.errors import UsageError
+from hamotor.files import write_whole
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.comparison import compare
 from hamotor.run.report import to_json

@@ -12,7 +12,6 @@ import json
 import sys
 from collections.abc import Sequence
 
-from hamotor.bench.account import write_whole
 from hamotor.bench.problems import (
     REFERENCES,
     WITNESSES,
@@ -22,6 +21,7 @@ from hamotor.bench.problems import (
     problem,
     witnesses_of,
 )
+from hamotor.files import write_whole
 
 
 def main(names: Sequence[str]) -> int:

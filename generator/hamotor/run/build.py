@@ -16,7 +16,6 @@ import shlex
 import shutil
 import subprocess
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
@@ -24,6 +23,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hamotor.errors import ToolError, UsageError, suggest
+from hamotor.files import whole, write_whole
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 """The checkout this package runs from: `generated/` and `runtime/` lie here."""
@@ -206,7 +206,7 @@ def _has(compiler: Compiler, requirement: Requirement, cache: Path) -> bool:
             return False
     answers[known] = "yes"
     cache.mkdir(parents=True, exist_ok=True)
-    _write_whole(remembered, json.dumps(answers, indent=1).encode())
+    write_whole(remembered, json.dumps(answers, indent=1))
     return True
 
 
@@ -248,7 +248,7 @@ def _version_of(command: tuple[str, ...], cache: Path) -> str:
         version = answer.stdout.splitlines()[0].strip() if answer.stdout else command[0]
         versions[known] = version
         cache.mkdir(parents=True, exist_ok=True)
-        _write_whole(remembered, json.dumps(versions, indent=1).encode())
+        write_whole(remembered, json.dumps(versions, indent=1))
     return version
 
 
@@ -372,7 +372,7 @@ def compile_scene(
     else:
         _forget_old_scenes(cache)
         folder.mkdir(parents=True, exist_ok=True)
-        _write_whole(kept_source, source.encode())
+        write_whole(kept_source, source)
         on_compile()
         started = time.perf_counter()
         _run_compiler(compiler, flags, links, includes, libraries, kept_source, library)
@@ -414,39 +414,29 @@ def _run_compiler(
     source: Path,
     library: Path,
 ) -> None:
-    unfinished = library.with_name(f".scene-{threading.get_native_id()}.so")
     command = [*compiler.command, *flags]
     for folder in includes:
         command += ["-I", str(folder)]
     for folder in libraries:
         command += ["-isystem", str(folder)]
-    command += ["-o", str(unfinished), str(source), *links]
     try:
-        answer = subprocess.run(
-            command, capture_output=True, text=True, errors="replace", check=False
-        )
-        if answer.returncode != 0:
-            raise ToolError(
-                f"{compiler.command[0]} rejected the compiled scene:\n"
-                f"{_first_errors(answer.stderr)}\n"
-                f"The source is kept in {source}\n"
-                f"The command was: {shlex.join(command)}"
+        with whole(library) as unfinished:
+            command += ["-o", str(unfinished), str(source), *links]
+            answer = subprocess.run(
+                command, capture_output=True, text=True, errors="replace", check=False
             )
-        unfinished.replace(library)
+            if answer.returncode != 0:
+                raise ToolError(
+                    f"{compiler.command[0]} rejected the compiled scene:\n"
+                    f"{_first_errors(answer.stderr)}\n"
+                    f"The source is kept in {source}\n"
+                    f"The command was: {shlex.join(command)}"
+                )
     except OSError as problem:
         raise ToolError(f"could not run {compiler.command[0]}: {problem}") from problem
-    finally:
-        unfinished.unlink(missing_ok=True)
 
 
 def _first_errors(output: str) -> str:
     lines = output.strip().splitlines()
     errors = [line for line in lines if "error" in line.lower()]
     return "\n".join("  " + line for line in (errors or lines or ["no message"])[:_ERRORS_SHOWN])
-
-
-def _write_whole(path: Path, content: bytes) -> None:
-    """Write so that a reader sees the whole file or none of it."""
-    unfinished = path.with_name(f".{path.name}-{threading.get_native_id()}")
-    unfinished.write_bytes(content)
-    unfinished.replace(path)

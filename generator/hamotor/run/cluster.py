@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import logging
-import os
 import shutil
 import signal
 import sys
@@ -27,6 +26,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from hamotor.errors import HamotorError, ToolError, UsageError
+from hamotor.files import whole
 from hamotor.run.build import REPOSITORY
 from hamotor.run.dataset import PARTS
 from hamotor.run.ensemble import Job, Meter, Part, library_of, run_part
@@ -163,10 +163,8 @@ def compute_part(folder: str, number: int) -> None:
         return
     job, library = _job(folder)
     part = run_part(library, job, number)
-    unfinished = path.with_name(f".{path.name}-{os.uname().nodename}-{os.getpid()}")
-    with unfinished.open("wb") as file:
+    with whole(path) as unfinished, unfinished.open("wb") as file:
         np.savez(file, **part.to_arrays())
-    unfinished.replace(path)
 
 
 @cache

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.errors import UsageError
+from hamotor.files import whole
 from hamotor.run.library import Description, Rows
 
 if TYPE_CHECKING:
@@ -156,10 +157,9 @@ class DiskRecorder:
         self._rows_waiting = 0
         table = _arrow_table(rows, self._description)
         part = self._parts / f"part-{self._next_part:05d}.parquet"
-        unfinished = part.with_name(f".{part.name}")
-        # Doubles of a smooth motion hardly repeat: a dictionary would only cost time.
-        pq.write_table(table, unfinished, compression="zstd", use_dictionary=False)
-        unfinished.replace(part)
+        with whole(part) as unfinished:
+            # Doubles of a smooth motion hardly repeat: a dictionary would only cost time.
+            pq.write_table(table, unfinished, compression="zstd", use_dictionary=False)
         self._next_part += 1
         if self._csv is not None:
             self._csv.append(table)

@@ -5,7 +5,6 @@ Colours are Okabe and Ito's, which colour-blind readers can tell apart.
 
 from __future__ import annotations
 
-import os
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from hamotor.files import whole
 from hamotor.run.attitude import AXES, has_attitude, rotation_matrices
 
 if TYPE_CHECKING:
@@ -58,9 +58,8 @@ def save(figures: Mapping[str, Figure], folder: Path) -> None:
     """Write the pictures into a folder, each as a whole or not at all."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in figures.items():
-        unfinished = folder / f".{os.getpid()}-{name}"
-        figure.savefig(unfinished, dpi=_DPI, format="png")
-        unfinished.replace(folder / name)
+        with whole(folder / name) as unfinished:
+            figure.savefig(unfinished, dpi=_DPI, format="png")
 
 
 def draw_path(report: Mapping[str, Any], table: Table) -> Figure:

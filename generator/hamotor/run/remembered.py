@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import re
 import threading
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+from hamotor.files import write_whole
 
 GENERATOR = Path(__file__).resolve().parents[2]
 DERIVING = (
@@ -64,11 +65,9 @@ class Remembered:
             return self._values[name]
 
     def _write(self) -> None:
-        unfinished = self._path.with_name(f".{self._path.name}-{os.getpid()}")
         with suppress(OSError):
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            unfinished.write_text(json.dumps(self._values), encoding="utf-8")
-            unfinished.replace(self._path)
+            write_whole(self._path, json.dumps(self._values))
             kept = sorted(self._path.parent.glob("*.json"), key=lambda p: p.stat().st_mtime)
             for old in kept[:-MOST_KEPT]:
                 old.unlink(missing_ok=True)
