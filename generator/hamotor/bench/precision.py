@@ -523,7 +523,11 @@ def _times(one: Problem, contestants: Sequence[Contestant], extent: Extent) -> l
             _row(uncounted[c], setting, answers[c, setting], one, observed_by)
             for c, setting in places
         ]
-        chosen = worth_repeating(seen, one.norm)
+        chosen = [
+            k
+            for k in worth_repeating(seen, one.norm)
+            if answers[places[k]]["best_s"] < _HOPELESS * contestants[places[k][0]].longest_s
+        ]
         say(f"{one.name}: {len(chosen)} of {len(seen)} settings are worth repeating")
         return [places[k] for k in chosen]
 

@@ -26,8 +26,9 @@ Times are those of the whole integration on one core, the best of the runs, whic
 interleaved over all contestants in one process; median and worst stand beside it, and the least \
 time that the thread had the processor. What takes more than ten times the least time to an error \
 as small (ours beside ours without closed forms, public solvers beside each other), or ends with \
-an error above 0.01, has only the few runs of a first look, as its row says. Set-up (generation, \
-compilation, building a solver, the first step) is not in them and listed apart.
+an error above 0.01, or takes more than ten times what ends its settings, has only the few runs of \
+a first look, as its row says. Set-up (generation, compilation, building a solver, the first step) \
+is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why; so is what takes more than a minute or \
 ends its process, of which nothing finer is tried. Settings go from coarse to fine until two in a \
