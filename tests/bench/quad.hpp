@@ -15,6 +15,7 @@ __extension__ __float128 cosq(__float128) noexcept;
 __extension__ __float128 sinhq(__float128) noexcept;
 __extension__ __float128 coshq(__float128) noexcept;
 __extension__ __float128 atan2q(__float128, __float128) noexcept;
+__extension__ __float128 acosq(__float128) noexcept;
 __extension__ __float128 fmaq(__float128, __float128, __float128) noexcept;
 __extension__ __float128 fabsq(__float128) noexcept;
 }
@@ -55,6 +56,7 @@ struct Quad {
   friend Quad sinh(Quad x) noexcept { return sinhq(x.bits); }
   friend Quad cosh(Quad x) noexcept { return coshq(x.bits); }
   friend Quad atan2(Quad y, Quad x) noexcept { return atan2q(y.bits, x.bits); }
+  friend Quad acos(Quad x) noexcept { return acosq(x.bits); }
   friend Quad fma(Quad a, Quad b, Quad c) noexcept { return fmaq(a.bits, b.bits, c.bits); }
   friend Quad abs(Quad x) noexcept { return fabsq(x.bits); }
 };
