@@ -32,9 +32,18 @@ using hamotor::pga3::SO3;
 using Lanes = hamotor::Pack<double, hamotor::widest<double>>;
 constexpr auto split = hamotor::rotation_split(moments);
 
+/// A number that is the same in every step.
+template <class S>
+constexpr S fixed(double x) {
+  if constexpr (std::is_same_v<S, hamotor::Counted>) {
+    return S::fixed(x);
+  } else {
+    return S(x);
+  }
+}
 template <class S>
 constexpr std::array<S, 3> in(const std::array<double, 3>& x) {
-  return {S(x[0]), S(x[1]), S(x[2])};
+  return {fixed<S>(x[0]), fixed<S>(x[1]), fixed<S>(x[2])};
 }
 
 /// A body about a fixed point, attitude and angular momentum only.
@@ -43,7 +52,7 @@ struct FreeRotation {
   template <class S>
   static constexpr auto system() {
     return hamotor::RigidBodies{
-        std::tuple{hamotor::PivotedBody<SO3, S, split>(S(mass), in<S>(moments), {}, {})}};
+        std::tuple{hamotor::PivotedBody<SO3, S, split>(fixed<S>(mass), in<S>(moments), {}, {})}};
   }
 };
 
@@ -52,7 +61,7 @@ struct FreeMotion {
   template <class S>
   static constexpr auto system() {
     return hamotor::RigidBodies{
-        std::tuple{hamotor::FreeBody<SE3, S, split>(S(mass), in<S>(moments))}};
+        std::tuple{hamotor::FreeBody<SE3, S, split>(fixed<S>(mass), in<S>(moments))}};
   }
 };
 
@@ -63,12 +72,12 @@ struct Spring {
   static constexpr auto system() {
     const auto at = in<S>(spring_at);
     return hamotor::RigidBodies{
-        std::tuple{hamotor::FreeBody<SE3, S, split>(S(mass), in<S>(moments))},
+        std::tuple{hamotor::FreeBody<SE3, S, split>(fixed<S>(mass), in<S>(moments))},
         std::tuple{
             hamotor::SpringToWorld<0, SE3, S, hamotor::RestLength::zero, hamotor::pga3::Origin<S>>{
                 .at = {at[0], at[1], at[2]},
                 .anchor = {},
-                .stiffness = S(stiffness),
+                .stiffness = fixed<S>(stiffness),
                 .rest_length = S(0)}}};
   }
 };
@@ -101,19 +110,20 @@ double flops() {
   using System = std::remove_cvref_t<decltype(system)>;
   hamotor::StateOf<System> state{};
   const auto start = member<System>(0);
-  state.motors[0] = start.motors[0].template cast<S>();
-  auto mu = state.momenta[0].components();
-  for (std::size_t k = 0; k < mu.size(); ++k) mu[k] = start.momenta[0].components()[k];
-  state.momenta[0] = std::remove_cvref_t<decltype(state.momenta[0])>::from(mu);
+  // Read from memory: of what the compiler knows it would know too much.
+  hamotor::detail::merge(state, start, [](S& to, const double& from) {
+    const volatile double read = from;
+    to = S(static_cast<double>(read));
+  });
   Method<System> method;
   const auto take = [&](int many) {
     for (int k = 0; k < many; ++k) {
       if constexpr (hamotor::stays_open<Method<System>>) {
         for (std::size_t turn = 0; turn < Method<System>::turns; ++turn) {
-          method.template do_turn<true>(system, state, S(step), turn);
+          method.template do_turn<true>(system, state, S::fixed(step), turn);
         }
       } else {
-        method.do_step(system, state, S(0), S(step));
+        method.do_step(system, state, S::fixed(0), S::fixed(step));
       }
     }
   };

@@ -253,6 +253,24 @@ TEST(Packs, functions_know_the_ends_of_the_numbers) {
   EXPECT_TRUE(std::signbit(sin(x)[2]) && std::isnan(sin(x)[3]));
 }
 
+template <class T, std::size_t W>
+void expect_a_number_s_less_product() {
+  const T third = T(1) / T(3);
+  const auto found =
+      hamotor::less_product(Pack<T, W>(third), Pack<T, W>(T(0.7)), Pack<T, W>(third));
+  EXPECT_EQ(found[W - 1], hamotor::mul_add(-third, T(0.7), third));
+}
+
+TEST(Packs, a_product_is_taken_away_with_the_rounding_of_a_number) {
+  expect_a_number_s_less_product<double, 8>();
+  expect_a_number_s_less_product<double, 4>();
+  expect_a_number_s_less_product<double, 2>();
+  expect_a_number_s_less_product<double, 1>();
+  expect_a_number_s_less_product<float, 16>();
+  expect_a_number_s_less_product<float, 8>();
+  expect_a_number_s_less_product<float, 4>();
+}
+
 TEST(Packs, masks_choose_lane_by_lane) {
   Pack<double, 4> x(2);
   x.set(1, -1);

@@ -55,6 +55,31 @@ TEST(Order, of_a_forced_body_in_the_plane) { expect_orders(sample::forced_se2())
 TEST(Order, of_two_bodies_in_space) { expect_orders(sample::two_bodies_se3()); }
 TEST(Order, of_two_bodies_in_the_plane) { expect_orders(sample::two_bodies_se2()); }
 
+/// A system whose momenta have to be stepped themselves.
+template <class System>
+struct WithoutRates : System {
+  constexpr explicit WithoutRates(const System& system) : System(system) {}
+  void rates_in() const = delete;
+};
+
+template <class System>
+long double apart_without_rates(const System& system) {
+  static_assert(hamotor::RateSystem<System>);
+  static_assert(!hamotor::RateSystem<WithoutRates<System>>);
+  const auto start = generic_state(system);
+  const auto one = stepped<Rk4<System>>(system, start, 0.05, 20);
+  const auto other = stepped<Rk4<WithoutRates<System>>>(WithoutRates(system), start, 0.05, 20);
+  return distance(one, other);
+}
+
+TEST(Rk4, steps_rates_as_it_steps_momenta) {
+  EXPECT_LT(apart_without_rates(sample::free_so3()), 3e-15);
+  EXPECT_LT(apart_without_rates(sample::free_se3()), 3e-15);
+  EXPECT_LT(apart_without_rates(sample::forced_so3()), 3e-15);
+  EXPECT_LT(apart_without_rates(sample::forced_se2()), 3e-15);
+  EXPECT_LT(apart_without_rates(sample::two_bodies_se3()), 3e-15);
+}
+
 /// Against order 8 in shorter steps, in long double: an error of 1e-17 is then one of the method.
 template <int order, class System>
 double splitting_order(const System& system, int coarse) {

@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "hamotor/scalar.hpp"
+#include "hamotor/space.hpp"
 #include "hamotor/state.hpp"
 
 namespace hamotor {
@@ -52,6 +53,19 @@ template <class Motor>
     return Defect::from(defect);
   } else {
     return unit_defect(m);
+  }
+}
+
+/// Puts a motor back on the group by −½ (M M~ − 1) M, rounded as its terms are; returns the largest
+/// absolute coefficient of M M~ − 1.
+template <class G, class Motor>
+HAMOTOR_INLINE constexpr typename Motor::Scalar put_back(Motor& motor) noexcept {
+  if constexpr (requires { Space<G>::put_back(motor); }) {
+    return Space<G>::put_back(motor);
+  } else {
+    const auto defect = rounded_defect(motor);
+    motor = motor + unit_correction(motor, defect);
+    return size(defect);
   }
 }
 
@@ -146,9 +160,7 @@ class LowDigits {
         detail::add_compensated(momentum, kept_.momenta[i], change.momenta[i]);
       } else {
         motor = motor + change.motors[i];
-        const auto defect = detail::rounded_defect(motor);
-        worst = scalar::max_abs(worst, detail::size(defect));
-        motor = motor + unit_correction(motor, defect);
+        worst = scalar::max_abs(worst, detail::put_back<typename System::Group>(motor));
         momentum = momentum + change.momenta[i];
       }
     }

@@ -19,6 +19,9 @@
 namespace hamotor {
 
 /// Double precision; what was done with all numbers of it stands in `counts`.
+///
+/// What is computed of `fixed` numbers and constants alone is fixed, too, and not counted: a loop
+/// of steps finds it once, before it begins.
 class Counted {
  public:
   /// What is told apart; the last one is of `state.hpp`.
@@ -30,6 +33,13 @@ class Counted {
     requires std::is_arithmetic_v<Number>
   constexpr Counted(Number x) noexcept : value_(static_cast<double>(x)) {}
 
+  /// A number that is the same in every step.
+  [[nodiscard]] static constexpr Counted fixed(double x) noexcept {
+    Counted result(x);
+    result.fixed_ = true;
+    return result;
+  }
+
   template <class Number>
     requires std::is_arithmetic_v<Number>
   explicit constexpr operator Number() const noexcept {
@@ -37,18 +47,21 @@ class Counted {
   }
 
   friend constexpr Counted operator+(const Counted& a, const Counted& b) noexcept {
-    return count(additions, a.value_ + b.value_);
+    return count(additions, a.value_ + b.value_, a, b);
   }
   friend constexpr Counted operator-(const Counted& a, const Counted& b) noexcept {
-    return count(additions, a.value_ - b.value_);
+    return count(additions, a.value_ - b.value_, a, b);
   }
   friend constexpr Counted operator*(const Counted& a, const Counted& b) noexcept {
-    return count(products, a.value_ * b.value_);
+    return count(products, a.value_ * b.value_, a, b);
   }
   friend constexpr Counted operator/(const Counted& a, const Counted& b) noexcept {
-    return count(quotients, a.value_ / b.value_);
+    return count(quotients, a.value_ / b.value_, a, b);
   }
-  friend constexpr Counted operator-(const Counted& a) noexcept { return -a.value_; }
+  friend constexpr Counted operator-(Counted a) noexcept {
+    a.value_ = -a.value_;
+    return a;
+  }
   constexpr Counted& operator+=(const Counted& b) noexcept { return *this = *this + b; }
   constexpr Counted& operator-=(const Counted& b) noexcept { return *this = *this - b; }
   constexpr Counted& operator*=(const Counted& b) noexcept { return *this = *this * b; }
@@ -60,9 +73,11 @@ class Counted {
     return a.value_ <=> b.value_;
   }
 
-  friend Counted sqrt(const Counted& x) noexcept { return count(roots, std::sqrt(x.value_)); }
-#define HAMOTOR_COUNTED(name) \
-  friend Counted name(const Counted& x) noexcept { return count(functions, std::name(x.value_)); }
+  friend Counted sqrt(const Counted& x) noexcept { return count(roots, std::sqrt(x.value_), x, x); }
+#define HAMOTOR_COUNTED(name)                           \
+  friend Counted name(const Counted& x) noexcept {      \
+    return count(functions, std::name(x.value_), x, x); \
+  }
   HAMOTOR_COUNTED(sin)
   HAMOTOR_COUNTED(cos)
   HAMOTOR_COUNTED(tan)
@@ -78,7 +93,7 @@ class Counted {
 #undef HAMOTOR_COUNTED
   friend Counted floor(const Counted& x) noexcept { return std::floor(x.value_); }
   friend Counted atan2(const Counted& y, const Counted& x) noexcept {
-    return count(functions, std::atan2(y.value_, x.value_));
+    return count(functions, std::atan2(y.value_, x.value_), y, x);
   }
   friend constexpr Counted fma(const Counted& a, const Counted& b, const Counted& c) noexcept {
     const Counted twice_rounded = a * b + c;
@@ -98,12 +113,22 @@ class Counted {
   }
 
  private:
-  [[nodiscard]] static constexpr Counted count(Kind kind, double value) noexcept {
-    if (!std::is_constant_evaluated() && !__builtin_constant_p(value)) ++counts[kind];
-    return value;
+  [[nodiscard]] static constexpr Counted count(Kind kind, double value, const Counted& a,
+                                               const Counted& b) noexcept {
+    Counted result(value);
+    if (std::is_constant_evaluated()) {
+      result.fixed_ = a.fixed_ || b.fixed_;
+      return result;
+    }
+    const bool a_is = a.fixed_ || __builtin_constant_p(a.value_);
+    const bool b_is = b.fixed_ || __builtin_constant_p(b.value_);
+    result.fixed_ = a_is && b_is && (a.fixed_ || b.fixed_);
+    if (!result.fixed_ && !__builtin_constant_p(value)) ++counts[kind];
+    return result;
   }
 
   double value_ = 0;
+  bool fixed_ = false;
 };
 
 template <>

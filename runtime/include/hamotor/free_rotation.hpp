@@ -246,7 +246,11 @@ class PrincipalRotation {
   static constexpr bool is_exact = R == 1 || split.axes < 2;
 
   constexpr explicit PrincipalRotation(const Angular& moments) noexcept : moments_(moments) {
-    for (std::size_t k = 0; k < R; ++k) inverse_[k] = S(1) / moments[k];
+    const Angular difference = differences();
+    for (std::size_t k = 0; k < R; ++k) {
+      inverse_[k] = S(1) / moments[k];
+      ratios_[k] = difference[k] / moments[k];
+    }
     if constexpr (R == 3) {
       const S& c = moments[common];
       outer_ = (c - moments[outer]) / (c * moments[outer]);
@@ -263,6 +267,20 @@ class PrincipalRotation {
     for (std::size_t k = 0; k < R; ++k) w[k] = pi[k] * inverse_[k];
     return w;
   }
+
+  /// 1/J_k.
+  [[nodiscard]] constexpr const Angular& inverse_moments() const noexcept { return inverse_; }
+
+  /// J_k dΩ_k/dt = (J_i − J_j) Ω_i Ω_j for i, j, k in cyclic order: those differences, and over
+  /// J_k.
+  [[nodiscard]] constexpr Angular differences() const noexcept {
+    Angular result{};
+    if constexpr (R == 3) {
+      for (std::size_t k = 0; k < R; ++k) result[k] = moments_[(k + 1) % 3] - moments_[(k + 2) % 3];
+    }
+    return result;
+  }
+  [[nodiscard]] constexpr const Angular& ratios() const noexcept { return ratios_; }
 
   /// ½ Σ Π_k²/J_k, J.
   [[nodiscard]] constexpr S energy(const Angular& pi) const noexcept {
@@ -491,6 +509,7 @@ class PrincipalRotation {
 
   Angular moments_;
   Angular inverse_{};
+  Angular ratios_{};
   S outer_ = S(0);
   S inner_ = S(0);
 };

@@ -145,6 +145,28 @@ class Pack {
     }
     return a * b + c;
   }
+  /// c − a b in each lane, rounded as `less_product` of numbers.
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Pack less_product(const Pack& a, const Pack& b,
+                                                                  const Pack& c) noexcept {
+#if defined(__x86_64__) && defined(__FMA__) && defined(__GNUC__)
+    if (!std::is_constant_evaluated()) {
+      if constexpr (std::same_as<T, double>) {
+#ifdef __AVX512F__
+        if constexpr (W == 8) return Pack(Vector(_mm512_fnmadd_pd(a.v_, b.v_, c.v_)));
+#endif
+        if constexpr (W == 4) return Pack(Vector(_mm256_fnmadd_pd(a.v_, b.v_, c.v_)));
+        if constexpr (W == 2) return Pack(Vector(_mm_fnmadd_pd(a.v_, b.v_, c.v_)));
+      } else {
+#ifdef __AVX512F__
+        if constexpr (W == 16) return Pack(Vector(_mm512_fnmadd_ps(a.v_, b.v_, c.v_)));
+#endif
+        if constexpr (W == 8) return Pack(Vector(_mm256_fnmadd_ps(a.v_, b.v_, c.v_)));
+        if constexpr (W == 4) return Pack(Vector(_mm_fnmadd_ps(a.v_, b.v_, c.v_)));
+      }
+    }
+#endif
+    return multiply_add(-a, b, c);
+  }
   /// a b + c in each lane, rounded once.
   [[nodiscard]] HAMOTOR_INLINE friend constexpr Pack fma(const Pack& a, const Pack& b,
                                                          const Pack& c) noexcept {

@@ -87,6 +87,17 @@ template <class S>
 #endif
 }
 
+/// c − a b, rounded as mul_add(−a, b, c).  Of a pack, one instruction also where −a is in several
+/// sums: there the compiler would make −a by itself first.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less_product(const S& a, const S& b, const S& c) noexcept {
+  if constexpr (requires { S::less_product(a, b, c); }) {
+    return S::less_product(a, b, c);
+  } else {
+    return mul_add(-a, b, c);
+  }
+}
+
 namespace detail {
 
 template <class S>

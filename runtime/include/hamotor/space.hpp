@@ -64,6 +64,44 @@ struct RotorIncrement {
   std::array<S, R> sines;
 };
 
+namespace detail {
+
+/// Sums that begin with nothing, where others begin with an array's components.
+struct Nothing {
+  struct Zero {};
+  [[nodiscard]] HAMOTOR_INLINE constexpr Zero operator[](std::size_t) const noexcept { return {}; }
+};
+
+/// start + a₁ b₁ + a₂ b₂ + …, in one sum: no addition but those of the products, as becomes lanes,
+/// where other blocks' operations fill the time in which these wait.
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S onto(const S& start, const Rest&... rest) noexcept {
+  return dot_onto(start, rest...);
+}
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S onto(Nothing::Zero, const S& a, const S& b,
+                                              const Rest&... rest) noexcept {
+  return dot_onto(a * b, rest...);
+}
+
+/// sum − a₁ b₁ − a₂ b₂ − ….
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum) noexcept {
+  return sum;
+}
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum, const S& a, const S& b,
+                                              const Rest&... rest) noexcept {
+  return less(less_product(a, b, sum), rest...);
+}
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less(Nothing::Zero, const S& a, const S& b,
+                                              const Rest&... rest) noexcept {
+  return less(-(a * b), rest...);
+}
+
+}  // namespace detail
+
 /// Geometry of the space on which G acts; specialised for each group.
 template <class G>
 struct Space;
@@ -86,6 +124,67 @@ struct Space<pga3::SE3> {
   [[nodiscard]] static constexpr pga3::se3::Momentum<S> wrench(
       const pga3::Bivector<S>& line) noexcept {
     return {line.e01, line.e02, line.e03, line.e23, line.e31, line.e12};
+  }
+
+  /// μ + a (x × f, f).
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::se3::Momentum<S> with_force(
+      const pga3::se3::Momentum<S>& mu, const Factor& a, const pga3::Point<S>& x,
+      const std::array<S, 3>& f) noexcept {
+    const S x1 = a * x.e032;
+    const S x2 = a * x.e013;
+    const S x3 = a * x.e021;
+    return {dot(mu.l23, x2, f[2], -x3, f[1]), dot(mu.l31, x3, f[0], -x1, f[2]),
+            dot(mu.l12, x1, f[1], -x2, f[0]), mul_add(a, f[0], mu.p1),
+            mul_add(a, f[1], mu.p2),          mul_add(a, f[2], mu.p3)};
+  }
+
+  /// x − ~M o M of the origin o.
+  template <class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr std::array<S, 3> from_origin(
+      const pga3::Point<S>& x, const pga3::Motor<S>& m) noexcept {
+    using detail::less;
+    return {
+        mul_add(S(-2), less(dot(m.e01 * m.s, m.e03, m.e31, m.e0123, m.e23), m.e02, m.e12), x.e032),
+        mul_add(S(-2), less(dot(m.e02 * m.s, m.e01, m.e12, m.e0123, m.e31), m.e03, m.e23), x.e013),
+        mul_add(S(-2), less(dot(m.e03 * m.s, m.e02, m.e23, m.e0123, m.e12), m.e01, m.e31), x.e021)};
+  }
+
+  /// `start` and 2 M B of a rate B.
+  template <class Start, class S, class Rate>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Motor<S> with_twice_velocity(
+      const Start& start, const pga3::Motor<S>& m, const Rate& w) noexcept {
+    using detail::less;
+    using detail::onto;
+    return {onto(start[0], m.e23, w.w23, m.e31, w.w31, m.e12, w.w12),
+            less(onto(start[1], m.e31, w.w12), m.s, w.w23, m.e12, w.w31),
+            less(onto(start[2], m.e12, w.w23), m.s, w.w31, m.e23, w.w12),
+            less(onto(start[3], m.e23, w.w31), m.s, w.w12, m.e31, w.w23),
+            less(onto(start[4], m.e31, w.v3, m.e02, w.w12, m.e0123, w.w23), m.s, w.v1, m.e12, w.v2,
+                 m.e03, w.w31),
+            less(onto(start[5], m.e12, w.v1, m.e03, w.w23, m.e0123, w.w31), m.s, w.v2, m.e23, w.v3,
+                 m.e01, w.w12),
+            less(onto(start[6], m.e23, w.v2, m.e01, w.w31, m.e0123, w.w12), m.s, w.v3, m.e31, w.v1,
+                 m.e02, w.w23),
+            less(start[7], m.e23, w.v1, m.e31, w.v2, m.e12, w.v3, m.e01, w.w23, m.e02, w.w31, m.e03,
+                 w.w12)};
+  }
+
+  /// M put back on the group, by −½ (M ~M − 1) M, and the largest coefficient of M ~M − 1.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga3::Motor<S>& m) noexcept {
+    const S defect = dot(S(-1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
+    const S e0123 = detail::less(m.e0123 * m.s, m.e01, m.e23, m.e02, m.e31, m.e03, m.e12);
+    const S half = S(-0.5) * defect;
+    m = {mul_add(half, m.s, m.s),
+         mul_add(half, m.e23, m.e23),
+         mul_add(half, m.e31, m.e31),
+         mul_add(half, m.e12, m.e12),
+         dot(m.e01, half, m.e01, e0123, m.e23),
+         dot(m.e02, half, m.e02, e0123, m.e31),
+         dot(m.e03, half, m.e03, e0123, m.e12),
+         less_product(e0123, m.s, mul_add(half, m.e0123, m.e0123))};
+    return scalar::max_abs(defect, e0123 + e0123);
   }
 
   /// M T − M for the translation T by d, in the body frame.
@@ -124,6 +223,39 @@ struct Space<pga3::SO3> {
     return {line.e01, line.e02, line.e03};
   }
 
+  /// μ + a x × f.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::so3::Momentum<S> with_force(
+      const pga3::so3::Momentum<S>& mu, const Factor& a, const pga3::Point<S>& x,
+      const std::array<S, 3>& f) noexcept {
+    const S x1 = a * x.e032;
+    const S x2 = a * x.e013;
+    const S x3 = a * x.e021;
+    return {dot(mu.l23, x2, f[2], -x3, f[1]), dot(mu.l31, x3, f[0], -x1, f[2]),
+            dot(mu.l12, x1, f[1], -x2, f[0])};
+  }
+
+  /// `start` and 2 M B of a rate B.
+  template <class Start, class S, class Rate>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Rotor<S> with_twice_velocity(
+      const Start& start, const pga3::Rotor<S>& m, const Rate& w) noexcept {
+    using detail::less;
+    using detail::onto;
+    return {onto(start[0], m.e23, w.w23, m.e31, w.w31, m.e12, w.w12),
+            less(onto(start[1], m.e31, w.w12), m.s, w.w23, m.e12, w.w31),
+            less(onto(start[2], m.e12, w.w23), m.s, w.w31, m.e23, w.w12),
+            less(onto(start[3], m.e23, w.w31), m.s, w.w12, m.e31, w.w23)};
+  }
+
+  /// M put back on the group, by −½ (M ~M − 1) M, and |M ~M − 1|.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga3::Rotor<S>& m) noexcept {
+    const S defect = dot(S(-1), m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
+    const S half = S(-0.5) * defect;
+    m = mul_add(half, m, m);
+    return scalar::abs(defect);
+  }
+
   /// M q − M.
   template <class S>
   [[nodiscard]] static constexpr pga3::Rotor<S> rotation_change(
@@ -149,6 +281,43 @@ struct Space<pga2::SE2> {
   template <class S>
   [[nodiscard]] static constexpr pga2::se2::Momentum<S> wrench(const pga2::Line<S>& line) noexcept {
     return {line.e0, line.e2, -line.e1};
+  }
+
+  /// μ + a (x × f, f).
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::se2::Momentum<S> with_force(
+      const pga2::se2::Momentum<S>& mu, const Factor& a, const pga2::Point<S>& x,
+      const std::array<S, 2>& f) noexcept {
+    return {dot(mu.l12, a * x.e20, f[1], a * -x.e01, f[0]), mul_add(a, f[0], mu.p1),
+            mul_add(a, f[1], mu.p2)};
+  }
+
+  /// x − ~M o M of the origin o.
+  template <class S>
+  [[nodiscard]] static constexpr std::array<S, 2> from_origin(const pga2::Point<S>& x,
+                                                              const pga2::Motor<S>& m) noexcept {
+    const auto y = sandwich(reverse(m), pga2::Origin<S>{});
+    return {x.e20 - y.e20, x.e01 - y.e01};
+  }
+
+  /// `start` and 2 M B of a rate B.
+  template <class Start, class S, class Rate>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::Motor<S> with_twice_velocity(
+      const Start& start, const pga2::Motor<S>& m, const Rate& w) noexcept {
+    using detail::less;
+    using detail::onto;
+    return {onto(start[0], m.e12, w.w12), less(start[1], m.s, w.w12),
+            less(onto(start[2], m.e02, w.w12), m.s, w.v1, m.e12, w.v2),
+            less(onto(start[3], m.e12, w.v1), m.s, w.v2, m.e01, w.w12)};
+  }
+
+  /// M put back on the group, by −½ (M ~M − 1) M, and |M ~M − 1|.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga2::Motor<S>& m) noexcept {
+    const S defect = dot(S(-1), m.s, m.s, m.e12, m.e12);
+    const S half = S(-0.5) * defect;
+    m = mul_add(half, m, m);
+    return scalar::abs(defect);
   }
 
   /// M T − M for the translation T by d, in the body frame.

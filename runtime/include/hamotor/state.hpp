@@ -9,6 +9,7 @@
 #include <concepts>
 #include <cstddef>
 #include <string_view>
+#include <utility>
 
 #include "hamotor/scalar.hpp"
 
@@ -120,6 +121,27 @@ concept PoweredSystem = GeneralSystem<System> && requires(const System& system) 
   system.power(State<typename System::Group, System::bodies, typename System::Scalar>{},
                typename System::Scalar{});
 };
+
+/// A system whose momenta are constant multiples of its rates, so that these can be stepped in
+/// their place, with any time as unit:
+/// - `rates_in(unit, momenta)`: unit B;
+/// - `slopes_in(start, unit, motors, rates)`: unit² μ̇ at these rates, each component of it in a
+///   unit of the system's own, added to the components `start(i)` of body i;
+/// - `rate_weights()`: what slopes are to be multiplied by for unit² Ḃ;
+/// - `momentum_weights(x)`: and for x unit² μ̇.
+template <class System>
+concept RateSystem =
+    SeparableSystem<System> &&
+    requires(
+        const System& system, const typename System::Motors& motors,
+        const typename System::Rates& rates, const typename System::Momenta& momenta,
+        const typename System::Scalar& unit,
+        decltype(std::declval<typename System::Momenta>()[0].components()) (*start)(std::size_t)) {
+      { system.rates_in(unit, momenta) } -> std::same_as<typename System::Rates>;
+      { system.slopes_in(start, unit, motors, rates) } -> std::same_as<typename System::Momenta>;
+      { system.rate_weights() } -> std::same_as<typename System::Rates>;
+      { system.momentum_weights(unit) } -> std::same_as<typename System::Momenta>;
+    };
 
 /// The state space of a system.
 template <class System>

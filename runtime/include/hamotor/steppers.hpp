@@ -13,6 +13,7 @@
 
 #include "hamotor/compensated.hpp"
 #include "hamotor/scalar.hpp"
+#include "hamotor/space.hpp"
 #include "hamotor/splitting_schemes.hpp"
 #include "hamotor/state.hpp"
 
@@ -26,6 +27,23 @@ template <class Rate, class S>
 [[nodiscard]] constexpr Rate dexp_inverse(const Rate& x, const Rate& b, const S& half) noexcept {
   const Rate once = ad(x, b);
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
+}
+
+/// The products of components, and what they add to others.
+template <class T>
+[[nodiscard]] HAMOTOR_INLINE constexpr T each_times(const T& a, const T& b) noexcept {
+  auto x = a.components();
+  const auto y = b.components();
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = x[k] * y[k];
+  return T::from(x);
+}
+template <class T, class A, class B>
+[[nodiscard]] HAMOTOR_INLINE constexpr T each_mul_add(const A& a, const B& b, const T& c) noexcept {
+  const auto x = a.components();
+  const auto y = b.components();
+  auto z = c.components();
+  for (std::size_t k = 0; k < z.size(); ++k) z[k] = mul_add(x[k], y[k], z[k]);
+  return T::from(z);
 }
 
 /// Whether spins commute with everything else in a system and are left to the end of a step.
@@ -154,14 +172,16 @@ class ExplicitMethod {
                       const X&... x) noexcept {
     move(
         state, by, forces, power,
-        [&](std::size_t i) {
+        [&](auto i) {  // not compiled where it is not called: packs have no such series
           Motor change{};
           ((change = change + motor_change(state.motors[i] + change, x[i])), ...);
           return change;
         },
         [&](std::size_t i, Motor& motor) {
           ((motor = gp(motor, exp(x[i]))), ...);
-          return unit_defect(motor);
+          const auto defect = unit_defect(motor);
+          motor = motor + unit_correction(motor, defect);
+          return size(defect);
         });
   }
 
@@ -172,7 +192,18 @@ class ExplicitMethod {
         state, by, forces, power, [&](std::size_t i) { return by * motors[i]; },
         [&](std::size_t i, Motor& motor) {
           motor = mul_add(by, motors[i], motor);
-          return rounded_defect(motor);
+          return put_back<G>(motor);
+        });
+  }
+
+  /// The same where each component of a momentum has a factor of its own.
+  constexpr void shift(StateOf<System>& state, const S& by, const Motors& motors,
+                       const Momenta& factors, const Momenta& forces) noexcept {
+    move(
+        state, factors, forces, S(0), [&](std::size_t i) { return by * motors[i]; },
+        [&](std::size_t i, Motor& motor) {
+          motor = mul_add(by, motors[i], motor);
+          return put_back<G>(motor);
         });
   }
 
@@ -184,26 +215,33 @@ class ExplicitMethod {
   }
 
  private:
-  /// Motors gain `change(i)`, or, in plain sums, are what `moved(i, motor)` makes of them, which
-  /// returns how far off the group.
-  template <class Change, class Moved>
-  constexpr void move(StateOf<System>& state, const S& by, const Momenta& forces, const S& power,
-                      const Change& change, const Moved& moved) noexcept {
+  /// Motors gain `change(i)`, or, in plain sums, become what `moved(i, motor)` makes of them, which
+  /// returns how far off the group they were; momenta gain `by`, or by[i] component by component,
+  /// times what pushes them.
+  template <class By, class Change, class Moved>
+  constexpr void move(StateOf<System>& state, const By& by, const Momenta& forces,
+                      [[maybe_unused]] const S& power, const Change& change,
+                      const Moved& moved) noexcept {
     if constexpr (compensated) {
       ChangeOf<System> changes{};
       for (std::size_t i = 0; i < n; ++i) {
         changes.motors[i] = change(i);
-        changes.momenta[i] = by * forces[i];
+        if constexpr (std::is_same_v<By, Momenta>) {
+          changes.momenta[i] = each_times(by[i], forces[i]);
+        } else {
+          changes.momenta[i] = by * forces[i];
+        }
       }
       record(account_.drift, account_.low.add(state, changes));
     } else {
       std::array<S, n> defects{};
       for (std::size_t i = 0; i < n; ++i) {
-        auto& motor = state.motors[i];
-        const auto defect = moved(i, motor);
-        defects[i] = size(defect);
-        motor = motor + unit_correction(motor, defect);
-        state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
+        defects[i] = moved(i, state.motors[i]);
+        if constexpr (std::is_same_v<By, Momenta>) {
+          state.momenta[i] = each_mul_add(by[i], forces[i], state.momenta[i]);
+        } else {
+          state.momenta[i] = mul_add(by, forces[i], state.momenta[i]);
+        }
       }
       record(account_.drift, defects);
     }
@@ -286,6 +324,144 @@ class Rkmk4 : public detail::ExplicitMethod<System, summation> {
   }
 };
 
+namespace detail {
+
+/// What `Rk4` takes through its stages: M and μ, of any system.
+template <HamiltonianSystem System>
+class MomentumStages {
+  using S = typename System::Scalar;
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  using Place = StateOf<System>;
+  /// Ṁ, μ̇ and dH/dt.
+  struct Slope {
+    decltype(Place::motors) motors;
+    decltype(Place::momenta) momenta;
+    S power{};
+  };
+
+  constexpr MomentumStages(const System& system, const S& t, const S& h) noexcept
+      : system_(system), time_(t), half_step_(S(0.5) * h) {}
+
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place start(const StateOf<System>& state) const noexcept {
+    return state;
+  }
+
+  /// After so many half steps.
+  [[nodiscard]] HAMOTOR_INLINE constexpr Slope slope(const Place& there,
+                                                     int halves) const noexcept {
+    const S t = mul_add(S(halves), half_step_, time_);
+    const auto now = gradient(system_, there, t);
+    Slope result{};
+    result.momenta = free_momentum_rates(system_, there.momenta, now.rates);
+    for (std::size_t i = 0; i < n; ++i) {
+      result.motors[i] = kinematics(there.motors[i], now.rates[i]);
+      if constexpr (System::has_forque) result.momenta[i] = result.momenta[i] - now.forques[i];
+    }
+    if constexpr (PoweredSystem<System>) result.power = system_.power(there, t);
+    return result;
+  }
+
+  HAMOTOR_INLINE constexpr void add_last(Slope& sum, const Place& there,
+                                         int halves) const noexcept {
+    const Slope last = slope(there, halves);
+    for (std::size_t i = 0; i < n; ++i) {
+      sum.motors[i] = sum.motors[i] + last.motors[i];
+      sum.momenta[i] = sum.momenta[i] + last.momenta[i];
+    }
+    if constexpr (PoweredSystem<System>) sum.power = sum.power + last.power;
+  }
+
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place moved(const Place& from, int halves,
+                                                     const Slope& along) const noexcept {
+    const S by = S(halves) * half_step_;
+    Place there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = mul_add(by, along.motors[i], from.motors[i]);
+      there.momenta[i] = mul_add(by, along.momenta[i], from.momenta[i]);
+    }
+    return there;
+  }
+
+ private:
+  const System& system_;
+  S time_;
+  S half_step_;
+};
+
+/// The same with rates B = ∂H/∂μ in place of momenta, which are constant multiples of them, and
+/// h/4 as unit of time: nothing is then multiplied by J or h at every stage.
+template <RateSystem System>
+class RateStages {
+  using S = typename System::Scalar;
+  using Space = hamotor::Space<typename System::Group>;
+  static constexpr std::size_t n = System::bodies;
+
+ public:
+  struct Place {
+    typename System::Motors motors;
+    typename System::Rates rates;  ///< h B/4
+  };
+  /// h Ṁ/2, and μ̇ in units of the system's.
+  struct Slope {
+    typename System::Motors motors;
+    typename System::Momenta momenta;
+  };
+
+  constexpr RateStages(const System& system, const S& /*t*/, const S& h) noexcept
+      : system_(system), unit_(S(0.25) * h) {}
+
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place start(const StateOf<System>& state) const noexcept {
+    return {state.motors, system_.rates_in(unit_, state.momenta)};
+  }
+
+  [[nodiscard]] HAMOTOR_INLINE constexpr Slope slope(const Place& there,
+                                                     int /*halves*/) const noexcept {
+    Slope result{};
+    const auto nothing = [](std::size_t) { return Nothing{}; };
+    result.momenta = system_.slopes_in(nothing, unit_, there.motors, there.rates);
+    for (std::size_t i = 0; i < n; ++i) {
+      result.motors[i] = Space::with_twice_velocity(Nothing{}, there.motors[i], there.rates[i]);
+    }
+    return result;
+  }
+
+  /// The last slope's terms are added to the sum one by one.
+  HAMOTOR_INLINE constexpr void add_last(Slope& sum, const Place& there,
+                                         int /*halves*/) const noexcept {
+    const auto start = [&](std::size_t i) { return sum.momenta[i].components(); };
+    sum.momenta = system_.slopes_in(start, unit_, there.motors, there.rates);
+    for (std::size_t i = 0; i < n; ++i) {
+      sum.motors[i] =
+          Space::with_twice_velocity(sum.motors[i].components(), there.motors[i], there.rates[i]);
+    }
+  }
+
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place moved(const Place& from, int halves,
+                                                     const Slope& along) const noexcept {
+    const auto weights = system_.rate_weights();
+    Place there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = halves == 1 ? from.motors[i] + along.motors[i]
+                                    : mul_add(S(halves), along.motors[i], from.motors[i]);
+      there.rates[i] = each_mul_add(S(2 * halves) * weights[i], along.momenta[i], from.rates[i]);
+    }
+    return there;
+  }
+
+  /// What slopes are to be multiplied by for h μ̇/6.
+  [[nodiscard]] HAMOTOR_INLINE constexpr typename System::Momenta sixth() const noexcept {
+    return system_.momentum_weights(S(1) / (S(1.5) * unit_));
+  }
+
+ private:
+  const System& system_;
+  S unit_;
+};
+
+}  // namespace detail
+
 /// The classical Runge–Kutta method of order 4 on the components of M and μ, put back on the group
 /// after every step.
 ///
@@ -294,64 +470,83 @@ class Rkmk4 : public detail::ExplicitMethod<System, summation> {
 template <HamiltonianSystem System, Summation summation = Summation::plain>
 class Rk4 : public detail::ExplicitMethod<System, summation> {
   using Base = detail::ExplicitMethod<System, summation>;
-  using Base::mean;
   using Base::n;
-  using typename Base::Momenta;
-  using typename Base::Motors;
   using typename Base::S;
+  static constexpr auto stages_of() noexcept {
+    if constexpr (RateSystem<System>) {
+      return std::type_identity<detail::RateStages<System>>{};
+    } else {
+      return std::type_identity<detail::MomentumStages<System>>{};
+    }
+  }
+  using Stages = typename decltype(stages_of())::type;
 
  public:
   static constexpr int order = 4;
   static constexpr std::string_view name = "rk4";
 
+  /// A step under way: what its stages need of each other.
+  class Step {
+   public:
+    static constexpr std::size_t stages = 4;
+
+    constexpr Step(const System& system, const StateOf<System>& state, const S& t,
+                   const S& h) noexcept
+        : stages_(system, t, h), start_(stages_.start(state)), here_(start_) {}
+
+    /// The next stage.
+    template <std::size_t number>
+    HAMOTOR_INLINE constexpr void take() noexcept {
+      if constexpr (number == 3) {
+        stages_.add_last(sum_, here_, 2);
+      } else {
+        const auto slope = stages_.slope(here_, number == 0 ? 0 : 1);
+        if constexpr (number == 0) {
+          sum_ = slope;
+        } else {
+          add_twice(slope);
+        }
+        here_ = stages_.moved(start_, number == 2 ? 2 : 1, slope);
+      }
+    }
+
+   private:
+    friend Rk4;
+
+    HAMOTOR_INLINE constexpr void add_twice(const typename Stages::Slope& slope) noexcept {
+      for (std::size_t i = 0; i < n; ++i) {
+        sum_.motors[i] = mul_add(S(2), slope.motors[i], sum_.motors[i]);
+        sum_.momenta[i] = mul_add(S(2), slope.momenta[i], sum_.momenta[i]);
+      }
+      if constexpr (PoweredSystem<System>) sum_.power = mul_add(S(2), slope.power, sum_.power);
+    }
+
+    Stages stages_;
+    typename Stages::Place start_;
+    typename Stages::Place here_;
+    typename Stages::Slope sum_{};
+  };
+
   /// Takes `state` from t to t + h.  Flat: a slope that is called returns through memory.
   [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                                           const S& h) noexcept {
-    const S half_step = S(0.5) * h;
-    const Slope one = slope(system, state, t);
-    const Slope two = slope(system, moved(state, half_step, one), t + half_step);
-    const Slope three = slope(system, moved(state, half_step, two), t + half_step);
-    const Slope four = slope(system, moved(state, h, three), t + h);
-
-    Motors motors{};
-    Momenta force{};
-    for (std::size_t i = 0; i < n; ++i) {
-      motors[i] = mean(one.motors[i], two.motors[i], three.motors[i], four.motors[i]);
-      force[i] = mean(one.force[i], two.force[i], three.force[i], four.force[i]);
-    }
-    this->shift(state, h / S(6), motors, force,
-                mean(one.power, two.power, three.power, four.power));
+    Step step(system, state, t, h);
+    step.template take<0>();
+    step.template take<1>();
+    step.template take<2>();
+    step.template take<3>();
+    finish(step, state, h);
   }
 
- private:
-  /// Ṁ, μ̇ and dH/dt.
-  struct Slope {
-    Motors motors;
-    Momenta force;
-    S power{};
-  };
-
-  [[nodiscard]] static constexpr Slope slope(const System& system, const StateOf<System>& state,
-                                             const S& t) noexcept {
-    const auto now = gradient(system, state, t);
-    Slope result{};
-    result.force = free_momentum_rates(system, state.momenta, now.rates);
-    for (std::size_t i = 0; i < n; ++i) {
-      result.motors[i] = kinematics(state.motors[i], now.rates[i]);
-      if constexpr (System::has_forque) result.force[i] = result.force[i] - now.forques[i];
+  /// Moves `state`, which `step` began with, to its end.
+  HAMOTOR_INLINE constexpr void finish(const Step& step, StateOf<System>& state,
+                                       const S& h) noexcept {
+    const auto& sum = step.sum_;
+    if constexpr (RateSystem<System>) {
+      this->shift(state, S(1) / S(3), sum.motors, step.stages_.sixth(), sum.momenta);
+    } else {
+      this->shift(state, h / S(6), sum.motors, sum.momenta, sum.power);
     }
-    if constexpr (PoweredSystem<System>) result.power = system.power(state, t);
-    return result;
-  }
-
-  [[nodiscard]] static constexpr StateOf<System> moved(const StateOf<System>& state, const S& h,
-                                                       const Slope& along) noexcept {
-    StateOf<System> there{};
-    for (std::size_t i = 0; i < n; ++i) {
-      there.motors[i] = mul_add(h, along.motors[i], state.motors[i]);
-      there.momenta[i] = mul_add(h, along.force[i], state.momenta[i]);
-    }
-    return there;
   }
 };
 
@@ -554,10 +749,7 @@ class Splitting {
   constexpr void put_back(StateOf<System>& state) noexcept {
     std::array<S, n> defects{};
     for (std::size_t i = 0; i < n; ++i) {
-      auto& motor = state.motors[i];
-      const auto defect = detail::rounded_defect(motor);
-      motor = motor + unit_correction(motor, defect);
-      defects[i] = detail::size(defect);
+      defects[i] = detail::put_back<G>(state.motors[i]);
     }
     detail::record(drift_, defects);
   }

@@ -19,6 +19,92 @@
 
 namespace hamotor {
 
+namespace detail {
+
+/// A factor of 1 that costs nothing.
+struct One {
+  template <class T>
+  [[nodiscard]] HAMOTOR_INLINE friend constexpr T operator*(const One&, const T& x) noexcept {
+    return x;
+  }
+  template <class T>
+  [[nodiscard]] HAMOTOR_INLINE friend constexpr T mul_add(const One&, const T& x,
+                                                          const T& y) noexcept {
+    return x + y;
+  }
+};
+
+struct Ones {
+  [[nodiscard]] constexpr One operator[](std::size_t) const noexcept { return {}; }
+};
+
+/// Each component by a factor.
+template <class Factor, class S, std::size_t D>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> scaled(const Factor& factor,
+                                                               std::array<S, D> x) noexcept {
+  for (auto& component : x) component = factor * component;
+  return x;
+}
+template <std::size_t D, class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> filled(const S& x) noexcept {
+  std::array<S, D> result{};
+  result.fill(x);
+  return result;
+}
+/// x − y of points, also of the origin y, which has no components.
+template <class Point, class Other>
+[[nodiscard]] constexpr auto difference(const Point& x, [[maybe_unused]] const Other& y) noexcept {
+  auto d = x.components();
+  if constexpr (Other::size > 0) {
+    const auto b = y.components();
+    for (std::size_t k = 0; k < d.size(); ++k) d[k] = d[k] - b[k];
+  }
+  return d;
+}
+
+/// `start` and p × w, in the plane p × w e3.
+template <class Start, class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 3> turned_at(
+    const Start& start, const std::array<S, 3>& p, const std::array<S, 3>& w) noexcept {
+  return {less(onto(start[0], p[1], w[2]), p[2], w[1]),
+          less(onto(start[1], p[2], w[0]), p[0], w[2]),
+          less(onto(start[2], p[0], w[1]), p[1], w[0])};
+}
+template <class Start, class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 2> turned_at(
+    const Start& start, const std::array<S, 2>& p, const std::array<S, 1>& w) noexcept {
+  return {onto(start[0], p[1], w[0]), less(start[1], p[0], w[0])};
+}
+
+/// `start` and, for each component of w, the product of the others by a factor.
+template <class Start, class S, class Factors>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 3> others_product(
+    const Start& start, const Factors& factors, const std::array<S, 3>& w) noexcept {
+  if constexpr (std::is_same_v<Factors, Ones>) {
+    return {onto(start[0], w[1], w[2]), onto(start[1], w[2], w[0]), onto(start[2], w[0], w[1])};
+  } else {
+    return {onto(start[0], factors[0], w[1] * w[2]), onto(start[1], factors[1], w[2] * w[0]),
+            onto(start[2], factors[2], w[0] * w[1])};
+  }
+}
+template <class Start, class S, class Factors>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 1> others_product(
+    const Start& start, const Factors&, const std::array<S, 1>&) noexcept {
+  if constexpr (std::is_same_v<Start, Nothing>) {
+    return {S(0)};
+  } else {
+    return {start[0]};
+  }
+}
+
+/// What follows the first R numbers that sums begin with.
+template <std::size_t R>
+[[nodiscard]] HAMOTOR_INLINE constexpr Nothing rest(const Nothing& nothing) noexcept {
+  return nothing;
+}
+
+}  // namespace detail
+
 /// What a body's free motion adds to its motor and its momentum.
 template <class G, class S>
 struct BodyChange {
@@ -198,6 +284,52 @@ class FreeBody : public PrincipalBody<G, S, split> {
     }
   }
 
+  /// B in another unit of time, `unit` B.
+  [[nodiscard]] constexpr Rate rate_in(const S& unit, const Momentum& mu) const noexcept {
+    auto x = mu.components();
+    const auto& inverse = rotation_.inverse_moments();
+    for (std::size_t k = 0; k < rotations; ++k) x[k] = unit * inverse[k] * x[k];
+    for (std::size_t k = rotations; k < x.size(); ++k) x[k] = unit * inverse_mass_ * x[k];
+    return Rate::from(x);
+  }
+
+  /// `start` and [μ, B] in that unit and with the mass as unit of masses; where no forque is added
+  /// to it, the angular part with J_i − J_j as unit.
+  template <bool has_forque, class Start>
+  [[nodiscard]] constexpr Momentum slope(const Start& start, const Rate& rate) const noexcept {
+    const auto x = rate.components();
+    const auto turning = detail::first<rotations>(x);
+    const auto linear =
+        detail::turned_at(detail::rest<rotations>(start), detail::rest<rotations>(x), turning);
+    if constexpr (has_forque) {
+      const auto factors = detail::scaled(inverse_mass_, rotation_.differences());
+      return Momentum::from(
+          detail::joined(detail::others_product(start, factors, turning), linear));
+    } else {
+      return Momentum::from(
+          detail::joined(detail::others_product(start, detail::Ones{}, turning), linear));
+    }
+  }
+  /// What a forque counts for then.
+  [[nodiscard]] constexpr S forque_weight(const S& unit) const noexcept {
+    return -unit * unit * inverse_mass_;
+  }
+  /// What such a slope is to be multiplied by for that of the rate, in the same unit.
+  template <bool has_forque>
+  [[nodiscard]] constexpr Rate rate_weights() const noexcept {
+    return Rate::from(detail::joined(
+        has_forque ? detail::scaled(mass_, rotation_.inverse_moments()) : rotation_.ratios(),
+        detail::filled<dimension>(S(1))));
+  }
+  /// And for x times that of the momentum.
+  template <bool has_forque>
+  [[nodiscard]] constexpr Momentum momentum_weights(const S& x) const noexcept {
+    const S mass = x * mass_;
+    return Momentum::from(detail::joined(
+        has_forque ? detail::filled<rotations>(mass) : detail::scaled(x, rotation_.differences()),
+        detail::filled<dimension>(mass)));
+  }
+
   /// ½ μ(B), J.
   [[nodiscard]] constexpr S kinetic(const Momentum& mu) const noexcept {
     const auto p = detail::rest<rotations>(mu.components());
@@ -209,12 +341,15 @@ class FreeBody : public PrincipalBody<G, S, split> {
     return sandwich(m, x);
   }
 
-  /// A point of the world in the principal frame, m; for its origin two thirds of the operations.
-  [[nodiscard]] constexpr Point in_body(const Element& m, const Point& x) const noexcept {
-    return sandwich(reverse(m), x);
+  /// From a point of the world to one of the body, principal frame, m; from the world's origin in
+  /// two thirds of the operations.
+  [[nodiscard]] constexpr std::array<S, dimension> reach(const Element& m, const Point& from,
+                                                         const Point& to) const noexcept {
+    return detail::difference(to, sandwich(reverse(m), from));
   }
-  [[nodiscard]] constexpr Point in_body(const Element& m, const Origin& x) const noexcept {
-    return sandwich(reverse(m), x);
+  [[nodiscard]] constexpr std::array<S, dimension> reach(const Element& m, const Origin&,
+                                                         const Point& to) const noexcept {
+    return Space<G>::from_origin(to, m);
   }
 
   /// −m g·x, x the centre of mass; g in the world frame, m/s².
@@ -223,13 +358,17 @@ class FreeBody : public PrincipalBody<G, S, split> {
     return -mass_ * detail::dot(g.components(), x.components());
   }
 
-  /// The body forque (+dH) of a field g: −m Rᵀg at the centre of mass.
-  [[nodiscard]] constexpr Momentum weight_forque(const Element& m,
-                                                 const Direction& g) const noexcept {
+  /// μ and `weight` times the body forque (+dH) of a field g: −m Rᵀg at the centre of mass.
+  template <class Weight>
+  [[nodiscard]] constexpr Momentum with_weight_forque(const Momentum& mu, const Element& m,
+                                                      const Direction& g,
+                                                      const Weight& weight) const noexcept {
     const auto f = sandwich(reverse(m), g).components();
-    std::array<S, dimension> p{};
-    for (std::size_t k = 0; k < dimension; ++k) p[k] = -mass_ * f[k];
-    return Momentum::from(detail::joined(std::array<S, rotations>{}, p));
+    auto x = mu.components();
+    for (std::size_t k = 0; k < dimension; ++k) {
+      x[rotations + k] = mul_add(weight * -mass_, f[k], x[rotations + k]);
+    }
+    return Momentum::from(x);
   }
 };
 
@@ -272,6 +411,38 @@ class PivotedBody : public PrincipalBody<G, S, split> {
     return coadjoint(rate(mu), mu);
   }
 
+  /// B in another unit of time, `unit` B.
+  [[nodiscard]] constexpr Rate rate_in(const S& unit, const Momentum& mu) const noexcept {
+    auto x = mu.components();
+    const auto& inverse = rotation_.inverse_moments();
+    for (std::size_t k = 0; k < rotations; ++k) x[k] = unit * inverse[k] * x[k];
+    return Rate::from(x);
+  }
+
+  /// `start` and [μ, B] in that unit; where no forque is added to it, with J_i − J_j as unit.
+  template <bool has_forque, class Start>
+  [[nodiscard]] constexpr Momentum slope(const Start& start, const Rate& rate) const noexcept {
+    if constexpr (has_forque) {
+      return Momentum::from(
+          detail::others_product(start, rotation_.differences(), rate.components()));
+    } else {
+      return Momentum::from(detail::others_product(start, detail::Ones{}, rate.components()));
+    }
+  }
+  /// What a forque counts for then.
+  [[nodiscard]] constexpr S forque_weight(const S& unit) const noexcept { return -unit * unit; }
+  /// What such a slope is to be multiplied by for that of the rate, in the same unit.
+  template <bool has_forque>
+  [[nodiscard]] constexpr Rate rate_weights() const noexcept {
+    return Rate::from(has_forque ? rotation_.inverse_moments() : rotation_.ratios());
+  }
+  /// And for x times that of the momentum.
+  template <bool has_forque>
+  [[nodiscard]] constexpr Momentum momentum_weights(const S& x) const noexcept {
+    return Momentum::from(has_forque ? detail::filled<rotations>(x)
+                                     : detail::scaled(x, rotation_.differences()));
+  }
+
   /// ½ μ(B), J.
   [[nodiscard]] constexpr S kinetic(const Momentum& mu) const noexcept {
     return rotation_.energy(mu.components());
@@ -298,11 +469,12 @@ class PivotedBody : public PrincipalBody<G, S, split> {
     return Point::from(y);
   }
 
-  /// A point of the world in the principal frame, m.
-  [[nodiscard]] constexpr Point in_body(const Element& m, const Point& x) const noexcept {
-    auto y = x.components();
+  /// From a point of the world to one of the body, principal frame, m.
+  [[nodiscard]] constexpr std::array<S, dimension> reach(const Element& m, const Point& from,
+                                                         const Point& to) const noexcept {
+    auto y = from.components();
     for (std::size_t k = 0; k < dimension; ++k) y[k] = y[k] - pivot_[k];
-    return sandwich(reverse(m), Point::from(y));
+    return detail::difference(to, sandwich(reverse(m), Point::from(y)));
   }
 
   /// −m g·x, x the centre of mass; g in the world frame, m/s².
@@ -311,10 +483,13 @@ class PivotedBody : public PrincipalBody<G, S, split> {
     return -mass_ * detail::dot(g.components(), x.components());
   }
 
-  /// The body forque (+dH) of a field g: −c × m Rᵀg.
-  [[nodiscard]] constexpr Momentum weight_forque(const Element& m,
-                                                 const Direction& g) const noexcept {
-    return -mass_ * Space<G>::wrench(regressive(Point::from(center_), sandwich(reverse(m), g)));
+  /// μ and `weight` times the body forque (+dH) of a field g: −c × m Rᵀg.
+  template <class Weight>
+  [[nodiscard]] constexpr Momentum with_weight_forque(const Momentum& mu, const Element& m,
+                                                      const Direction& g,
+                                                      const Weight& weight) const noexcept {
+    return Space<G>::with_force(mu, weight * -mass_, Point::from(center_),
+                                sandwich(reverse(m), g).components());
   }
 
  private:
@@ -337,12 +512,12 @@ struct UniformGravity {
     return sum;
   }
 
-  /// Adds the body forques.
-  template <class System, class Motors, class Momenta>
-  constexpr void add_forque(const System& system, const Motors& motors,
-                            Momenta& forque) const noexcept {
+  /// Adds the body forques, each body's with a weight.
+  template <class System, class Motors, class Momenta, class Weights>
+  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
+                            const Weights& weights) const noexcept {
     system.for_each_body([&](auto i, const auto& body) {
-      forque[i] = forque[i] + body.weight_forque(motors[i], acceleration);
+      forque[i] = body.with_weight_forque(forque[i], motors[i], acceleration, weights[i]);
     });
   }
 };
@@ -377,17 +552,6 @@ template <RestLength rest, class S>
   }
 }
 
-/// x − y of points, also of the origin y, which has no components.
-template <class Point, class Other>
-[[nodiscard]] constexpr auto difference(const Point& x, [[maybe_unused]] const Other& y) noexcept {
-  auto d = x.components();
-  if constexpr (Other::size > 0) {
-    const auto b = y.components();
-    for (std::size_t k = 0; k < d.size(); ++k) d[k] = d[k] - b[k];
-  }
-  return d;
-}
-
 }  // namespace detail
 
 /// Spring from a point of body number `index` to a point of the world: any Point or, for a body
@@ -407,15 +571,14 @@ struct SpringToWorld {
     return detail::spring_energy<rest>(stiffness, rest_length, detail::dot(d, d));
   }
 
-  /// Adds the body forque: the line of k (1 − ℓ/r) times the extension, in the body frame.
-  template <class System, class Motors, class Momenta>
-  constexpr void add_forque(const System& system, const Motors& motors,
-                            Momenta& forque) const noexcept {
-    auto f = detail::difference(at, system.template body<index>().in_body(motors[index], anchor));
-    const S pull = detail::tension<rest>(stiffness, rest_length, f);
-    for (auto& x : f) x = pull * x;
-    const auto force = Space<G>::template Direction<S>::from(f);
-    forque[index] = forque[index] + Space<G>::wrench(regressive(at, force));
+  /// Adds the body forque with a weight: the line of k (1 − ℓ/r) times the extension, in the body
+  /// frame.
+  template <class System, class Motors, class Momenta, class Weights>
+  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
+                            const Weights& weights) const noexcept {
+    const auto extension = system.template body<index>().reach(motors[index], anchor, at);
+    const S pull = weights[index] * detail::tension<rest>(stiffness, rest_length, extension);
+    forque[index] = Space<G>::with_force(forque[index], pull, at, extension);
   }
 };
 
@@ -435,19 +598,19 @@ struct SpringBetween {
     return detail::spring_energy<rest>(stiffness, rest_length, detail::dot(d, d));
   }
 
-  /// Adds the two body forques, of one force and its opposite.
-  template <class System, class Motors, class Momenta>
-  constexpr void add_forque(const System& system, const Motors& motors,
-                            Momenta& forque) const noexcept {
+  /// Adds the two body forques, of one force and its opposite, each with a weight.
+  template <class System, class Motors, class Momenta, class Weights>
+  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
+                            const Weights& weights) const noexcept {
     using Direction = typename Space<G>::template Direction<S>;
-    auto f = extension(system, motors);
+    const auto f = extension(system, motors);
     const S pull = detail::tension<rest>(stiffness, rest_length, f);
-    for (auto& x : f) x = pull * x;
-    const Direction force = Direction::from(f);
-    forque[one] =
-        forque[one] - Space<G>::wrench(regressive(at_one, sandwich(reverse(motors[one]), force)));
-    forque[two] =
-        forque[two] + Space<G>::wrench(regressive(at_two, sandwich(reverse(motors[two]), force)));
+    const auto add = [&](std::size_t body, const S& tension, const auto& at) {
+      const auto seen = sandwich(reverse(motors[body]), Direction::from(f)).components();
+      forque[body] = Space<G>::with_force(forque[body], weights[body] * tension, at, seen);
+    };
+    add(one, -pull, at_one);
+    add(two, pull, at_two);
   }
 
  private:
@@ -565,9 +728,49 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
     requires(has_forque)
   {
     Momenta result{};
-    std::apply(
-        [&](const auto&... interaction) { (interaction.add_forque(*this, motors, result), ...); },
-        interactions_);
+    add_forques(motors, result, detail::Ones{});
+    return result;
+  }
+
+  /// B for every body in another unit of time, `unit` B.
+  [[nodiscard]] constexpr Rates rates_in(const Scalar& unit,
+                                         const Momenta& momenta) const noexcept {
+    Rates result{};
+    for_each_body([&](auto i, const auto& one) { result[i] = one.rate_in(unit, momenta[i]); });
+    return result;
+  }
+
+  /// unit² μ̇ for every body at these motors and `unit` B, each component in a unit of its own,
+  /// added to `start`: for every body components, or nothing.
+  template <class Start>
+  [[nodiscard]] constexpr Momenta slopes_in(const Start& start, const Scalar& unit,
+                                            const Motors& motors,
+                                            const Rates& rates) const noexcept {
+    Momenta result{};
+    for_each_body([&](auto i, const auto& one) {
+      result[i] = one.template slope<has_forque>(start(i), rates[i]);
+    });
+    if constexpr (has_forque) {
+      std::array<Scalar, bodies> weights{};
+      for_each_body([&](auto i, const auto& one) { weights[i] = one.forque_weight(unit); });
+      add_forques(motors, result, weights);
+    }
+    return result;
+  }
+
+  /// What these are to be multiplied by for unit² Ḃ.
+  [[nodiscard]] constexpr Rates rate_weights() const noexcept {
+    Rates result{};
+    for_each_body(
+        [&](auto i, const auto& one) { result[i] = one.template rate_weights<has_forque>(); });
+    return result;
+  }
+
+  /// And for x unit² μ̇.
+  [[nodiscard]] constexpr Momenta momentum_weights(const Scalar& x) const noexcept {
+    Momenta result{};
+    for_each_body(
+        [&](auto i, const auto& one) { result[i] = one.template momentum_weights<has_forque>(x); });
     return result;
   }
 
@@ -644,6 +847,16 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   }
 
  private:
+  template <class Weights>
+  constexpr void add_forques(const Motors& motors, Momenta& forque,
+                             const Weights& weights) const noexcept {
+    std::apply(
+        [&](const auto&... interaction) {
+          (interaction.add_forque(*this, motors, forque, weights), ...);
+        },
+        interactions_);
+  }
+
   /// change(std::integral_constant i, body number i) of every body.
   template <class Change>
   [[nodiscard]] constexpr ChangeOf<RigidBodies> for_bodies(Change&& change) const noexcept {
