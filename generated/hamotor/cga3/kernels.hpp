@@ -2389,9 +2389,8 @@ template <class S>
 /// log(M), M ~M = 1.
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
-/// Cost: 38 mul, 8 add (3 fused), 5 div, 1 atan2, 4 compensated_dot, 4 compensated_dot_pair, 2
-/// compensated_dot_parts, 4 double_word_product, 1 double_word_reciprocal, 1 double_word_sqrt, 2
-/// max_abs, 1 pi, 2 scaling, 17 select, 1 sqrt.
+/// Cost: 46 mul, 12 add (7 fused), 5 div, 1 atan2, 4 compensated_dot_pair, 2 compensated_dot_parts,
+/// 4 double_word_product, 1 double_word_reciprocal, 2 max_abs, 1 pi, 2 scaling, 17 select, 2 sqrt.
 template <class S>
 [[nodiscard]] constexpr Line<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
@@ -2399,11 +2398,11 @@ template <class S>
   const S r_e13 = r_scaling.in * -m.e31;
   const S r_e23 = r_scaling.in * m.e23;
   const auto squares = scalar::compensated_dot_parts(r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
-  const auto root_of_squares = scalar::double_word_sqrt(squares);
-  const S sine = root_of_squares.hi * r_scaling.out;
+  const S square = squares.hi + squares.lo;
+  const S length = scalar::sqrt(square);
+  const S sine = length * r_scaling.out;
   const S angle = scalar::atan2(sine, m.s);
-  const S stretch = select(root_of_squares.hi > S(0),
-                           select(m.s > S(0), angle / sine, angle / root_of_squares.hi), S(0));
+  const S stretch = select(length > S(0), select(m.s > S(0), angle / sine, angle / length), S(0));
   const S half_turn = select(-m.s > S(0), scalar::pi<S>(), S(0));
   const S straight = S(1) / m.s;
   const auto q_scaling = scalar::scaling(scalar::max_abs(m.e1i, m.e2i, m.e3i, m.e123i));
@@ -2416,8 +2415,7 @@ template <class S>
   const auto overlap = scalar::compensated_dot_pair(r_e12, q_e3i, -r_e13, q_e2i, r_e23, q_e1i);
   const auto share = scalar::double_word_product(overlap, inverse);
   const auto pitch = scalar::compensated_dot_parts(m.s, share.hi, q_e123i, r_scaling.out);
-  const S norm2 =
-      scalar::compensated_dot(m.s, m.s, (squares.hi + squares.lo) * r_scaling.out, r_scaling.out);
+  const S norm2 = dot(square * r_scaling.out, r_scaling.out, m.s, m.s);
   const S along = -(pitch.hi + mul_add(m.s, share.lo, pitch.lo)) / norm2;
   const auto moment_e2i = scalar::compensated_dot_pair(-r_e12, q_e1i, r_e23, q_e3i);
   const auto n_e2i = scalar::double_word_product(moment_e2i, inverse);
@@ -2427,27 +2425,24 @@ template <class S>
   const auto n_e3i = scalar::double_word_product(moment_e3i, inverse);
   const S q_length = scalar::sqrt(dot(q_e1i, q_e1i, q_e2i, q_e2i, q_e3i, q_e3i));
   const S turn = select(q_length > S(0), half_turn / q_length, S(0));
-  return {.e23 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
+  return {.e23 = select(length > S(0), stretch * select(m.s > S(0), m.e23, r_e23),
                         select(q_length > S(0), turn * q_e1i, S(0))),
-          .e31 = -select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
+          .e31 = -select(length > S(0), stretch * select(m.s > S(0), -m.e31, r_e13),
                          select(q_length > S(0), turn * -q_e2i, S(0))),
-          .e12 = select(root_of_squares.hi > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
+          .e12 = select(length > S(0), stretch * select(m.s > S(0), m.e12, r_e12),
                         select(q_length > S(0), turn * q_e3i, half_turn)),
-          .e1i = select(
-              root_of_squares.hi > S(0),
-              stretch * -scalar::compensated_dot(r_e12, n_e2i.hi, r_e13, n_e3i.hi) * root * root +
-                  along * -r_e23 * q_scaling.out,
-              straight * m.e1i),
-          .e2i = select(
-              root_of_squares.hi > S(0),
-              stretch * -scalar::compensated_dot(-r_e12, n_e1i.hi, r_e23, n_e3i.hi) * root * root +
-                  along * r_e13 * q_scaling.out,
-              straight * m.e2i),
-          .e3i = select(
-              root_of_squares.hi > S(0),
-              stretch * -scalar::compensated_dot(-r_e13, n_e1i.hi, -r_e23, n_e2i.hi) * root * root +
-                  along * -r_e12 * q_scaling.out,
-              straight * m.e3i)};
+          .e1i = select(length > S(0),
+                        stretch * -scalar::fma(r_e13, n_e3i.hi, r_e12 * n_e2i.hi) * root * root +
+                            along * -r_e23 * q_scaling.out,
+                        straight * m.e1i),
+          .e2i = select(length > S(0),
+                        stretch * -scalar::fma(r_e23, n_e3i.hi, -r_e12 * n_e1i.hi) * root * root +
+                            along * r_e13 * q_scaling.out,
+                        straight * m.e2i),
+          .e3i = select(length > S(0),
+                        stretch * -scalar::fma(-r_e23, n_e2i.hi, -r_e13 * n_e1i.hi) * root * root +
+                            along * -r_e12 * q_scaling.out,
+                        straight * m.e3i)};
 }
 
 /// log: Versor -> Bivector

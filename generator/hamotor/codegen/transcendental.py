@@ -271,8 +271,8 @@ def log_kernel(
     cosine = m[0]
     r = _scaled(writer, {u: m[u] for u in plane.rotation}, "r", algebra)
     squares = writer.let("squares", call("compensated_dot_parts", *_squared(r.values)))
-    writer.let("root_of_squares", call("double_word_sqrt", squares))
-    length = Name("root_of_squares.hi")
+    square = writer.let("square", Sum(_part(squares, "hi"), _part(squares, "lo")))
+    length = writer.let("length", call("sqrt", square))
     sine = writer.let("sine", Product(length, r.outward))
     angle = writer.let("angle", call("atan2", sine, cosine))
     # θ / sin θ itself where it is moderate; else scaled, and applied in steps that stay in range.
@@ -321,9 +321,8 @@ def log_kernel(
     pitch = writer.let("pitch", call("compensated_dot_parts", *terms))
     low = MultiplyAdd(cosine, _part(share, "lo"), _part(pitch, "lo"))
     lengthwise = Sum(_part(pitch, "hi"), low)
-    square = Sum(_part(squares, "hi"), _part(squares, "lo"))
     sine2 = Product(square, r.outward), r.outward
-    norm2 = writer.let("norm2", call("compensated_dot", cosine, cosine, *sine2))
+    norm2 = writer.let("norm2", sum_of_products([sine2, (cosine, cosine)]))
     along = writer.let("along", Quotient(negative(lengthwise), norm2))
     q_moved = {v: q.values[v] for v in moved}
     normal = {}
@@ -344,7 +343,8 @@ def log_kernel(
         about = Select(q_length, about, half_turn if u == first else ZERO)
         out[u] = Select(length, out[u], about)
         (a, b), (c, d) = double[blade]
-        part = Product(stretch, negative(call("compensated_dot", a, b, c, d)))
+        # Rounded twice, also where the processor does not fuse.
+        part = Product(stretch, negative(call("fma", c, d, Product(a, b))))
         across = Product(Product(part, root), root)
         moved_along = Product(Product(along, x), q.outward)
         out[blade] = Select(length, Sum(across, moved_along), Product(straight, m[blade]))
