@@ -102,10 +102,10 @@ class Counted {
   }
 
   static Counted rough_log2(const Counted& x) noexcept {
-    return count(functions, scalar::rough_log2(x.value_));
+    return count(functions, scalar::rough_log2(x.value_), x, x);
   }
   static Counted rough_exp2(const Counted& x) noexcept {
-    return count(functions, scalar::rough_exp2(x.value_));
+    return count(functions, scalar::rough_exp2(x.value_), x, x);
   }
 
   static constexpr void note_evaluations(std::int64_t times) noexcept {
