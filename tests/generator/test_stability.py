@@ -120,7 +120,7 @@ def test_what_stops_is_tried_with_a_far_shorter_step(
     needle: stability.Case, reference: stability.Reference, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert needle.step is not None
-    far = needle.step / stability.FAR_SHORTER
+    far = needle.step / stability.FAR_SHORTER[0]
     with monkeypatch.context() as patch:
         stop_above(1.5 * far, patch)
         row = stability.judged("needle", needle, reference, "splitting2")

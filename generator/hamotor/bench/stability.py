@@ -14,11 +14,12 @@ nobody is asked for digits that the state does not hold:
 * a run in `float` is as good as its digits (one method of each family).
 
 Where h is too long for a method (it stops, its error is beyond 0.1 or does not yet fall as the
-order says) it is judged at h/4 or h/16, at h/256 where h/16 stops or leaves no digit, and the row
-says so.  It stays `unresolved` where that is too long as well, or where rounding × condition leaves
-no digit in a double: all that is asked then is that numbers stay finite and that what is promised
-for every step holds.  A method that stops with all these steps fails.  A case whose end holds few
-digits is judged at a half, a quarter or an eighth of its time, and goes on to its end.
+order says) it is judged at h/4 or h/16, at h/256 or h/1024 where h/16 stops or leaves no digit, and
+the row says so.  It stays `unresolved` where that is too long as well, or where rounding ×
+condition leaves no digit in a double: all that is asked then is that numbers stay finite and that
+what is promised for every step holds.  A method that stops with all these steps fails.  A case
+whose end holds few digits is judged at a half, a quarter or an eighth of its time, and goes on to
+its end.
 
 Beside them: exp and log of every group around multiples of π, runs that must stop cleanly, and a
 mass that no scalar holds.
@@ -65,8 +66,8 @@ AGREED: Final = 1e-15
 ROWS: Final = 1000
 SHORTER: Final = (1, 4, 16)
 """Parts of the case's step that a method is tried with, until it resolves the case."""
-FAR_SHORTER: Final = 256
-"""Part that a method is judged with where the last of these stops or leaves no digit."""
+FAR_SHORTER: Final = (256, 1024)
+"""Parts that a method is judged with where the last of these stops or leaves no digit."""
 FEW_DIGITS: Final = 1e-3
 """What rounding may leave at the time at which a case is judged."""
 PERTURBATION: Final = 1e-15
@@ -381,11 +382,11 @@ def end_state(run: Run) -> Vector:
 def judged(case: str, simulation: Simulation, reference: Reference, method: str) -> Row:
     """One method on one case, with the first of the steps h, h/4 and h/16 that resolves it.
 
-    With h/256 where h/16 stops or leaves no digit.
+    With h/256 or h/1024 where h/16 stops or leaves no digit.
     """
     traits = next(m for m in METHODS if m.name == method)
     notes: list[str] = []
-    for shorter in (*SHORTER, FAR_SHORTER):
+    for shorter in (*SHORTER, *FAR_SHORTER):
         assert simulation.step is not None
         finer = replace(simulation, step=simulation.step / shorter)
         of_step = f" of {finer.step:g} s" if shorter > 1 else ""
@@ -402,7 +403,7 @@ def judged(case: str, simulation: Simulation, reference: Reference, method: str)
         error = distance(end_state(coarse), reference.end, simulation)
         resolved = error <= UNRESOLVED or traits.order == 0 or not math.isfinite(error)
         half = distance(end_state(fine), reference.end, simulation)
-        last = shorter == FAR_SHORTER or (shorter == SHORTER[-1] and resolved)
+        last = shorter == FAR_SHORTER[-1] or (shorter >= SHORTER[-1] and resolved)
         if last or (resolved and half <= _allowed(traits, error, floor)) or floor > UNRESOLVED:
             if not resolved and floor > UNRESOLVED:
                 notes.append(f"rounding × condition is {floor:.0e}: no digit is left to judge")
