@@ -232,7 +232,7 @@ class Report {
   }
 
   [[nodiscard]] static int steps_for(std::size_t bodies) {
-    return bodies > 100000 ? 32 : bodies > 4096 ? 64 : static_cast<int>(131072 / bodies);
+    return bodies > 100000 ? 32 : bodies > 4096 ? 256 : static_cast<int>(131072 / bodies);
   }
   [[nodiscard]] int runs(std::size_t bodies) const {
     return bodies > 100000 ? 3 : bodies > 4096 ? 10 : quick_ ? 20 : 100;
