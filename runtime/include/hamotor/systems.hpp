@@ -803,9 +803,7 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
                                      const Scalar& h) const noexcept
     requires(has_two_turns)
   {
-    for_each_body([&](auto i, const auto& one) {
-      one.template turn<is_outer, is_small>(motors[i], momenta[i], h);
-    });
+    turn_each<is_outer, is_small>(motors, momenta, h, std::make_index_sequence<bodies>{});
   }
 
   /// Whether all those turns are small and remain so.
@@ -847,6 +845,13 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   }
 
  private:
+  /// A function, as g++ sometimes leaves a lambda as a call, for which a state goes through memory.
+  template <bool is_outer, bool is_small, std::size_t... i>
+  HAMOTOR_INLINE constexpr void turn_each(Motors& motors, Momenta& momenta, const Scalar& h,
+                                          std::index_sequence<i...>) const noexcept {
+    (std::get<i>(bodies_).template turn<is_outer, is_small>(motors[i], momenta[i], h), ...);
+  }
+
   template <class Weights>
   constexpr void add_forques(const Motors& motors, Momenta& forque,
                              const Weights& weights) const noexcept {
