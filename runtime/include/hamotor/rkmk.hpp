@@ -46,10 +46,11 @@ struct Slope {
   typename System::Scalar power{};
 };
 
-/// B, [μ, B] − F and dH/dt at a state and a time.
+/// B, [μ, B] − F and dH/dt at a state and a time, where a slope that is called would have to return
+/// through memory at every stage.
 template <class System>
-[[nodiscard]] constexpr Slope<System> slope_of(const System& system, const StateOf<System>& state,
-                                               const typename System::Scalar& t) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Slope<System> slope_in_place(
+    const System& system, const StateOf<System>& state, const typename System::Scalar& t) noexcept {
   const auto now = gradient(system, state, t);
   Slope<System> slope{now.rates, free_momentum_rates(system, state.momenta, now.rates), {}};
   if constexpr (System::has_forque) {
@@ -59,6 +60,13 @@ template <class System>
   }
   if constexpr (PoweredSystem<System>) slope.power = system.power(state, t);
   return slope;
+}
+
+/// The same.
+template <class System>
+[[nodiscard]] constexpr Slope<System> slope_of(const System& system, const StateOf<System>& state,
+                                               const typename System::Scalar& t) noexcept {
+  return slope_in_place(system, state, t);
 }
 
 /// Σ c_r x_r over r < count; terms without weight are left out.
@@ -253,7 +261,7 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
         there.momenta[i] = start.momenta[i] + by.forces[i];
         there.motors[i] = Coordinates::moved(start.motors[i], by.motors[i]);
       }
-      const auto now = detail::slope_of(system, there, mul_add(table.nodes[s], h_, t));
+      const auto now = detail::slope_in_place(system, there, mul_add(table.nodes[s], h_, t));
       Sum slope{{}, now.forces, now.power};
       for (std::size_t i = 0; i < n; ++i) {
         slope.motors[i] =
