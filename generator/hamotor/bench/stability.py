@@ -14,7 +14,7 @@ nobody is asked for digits that the state does not hold:
 * a run in `float` is as good as its digits (one method of each family).
 
 Where h is too long for a method (it stops, its error is beyond 0.1 or does not yet fall as the
-order says) it is judged at h/4 or h/16, at h/256 or h/1024 where h/16 stops or leaves no digit, and
+order says) it is judged at h/4 or h/16, at h/256 or h/2048 where h/16 stops or leaves no digit, and
 the row says so.  It stays `unresolved` where that is too long as well, or where rounding ×
 condition leaves no digit in a double: all that is asked then is that numbers stay finite and that
 what is promised for every step holds.  A method that stops with all these steps fails.  A case
@@ -66,7 +66,7 @@ AGREED: Final = 1e-15
 ROWS: Final = 1000
 SHORTER: Final = (1, 4, 16)
 """Parts of the case's step that a method is tried with, until it resolves the case."""
-FAR_SHORTER: Final = (256, 1024)
+FAR_SHORTER: Final = (256, 2048)
 """Parts that a method is judged with where the last of these stops or leaves no digit."""
 FEW_DIGITS: Final = 1e-3
 """What rounding may leave at the time at which a case is judged."""
@@ -382,7 +382,7 @@ def end_state(run: Run) -> Vector:
 def judged(case: str, simulation: Simulation, reference: Reference, method: str) -> Row:
     """One method on one case, with the first of the steps h, h/4 and h/16 that resolves it.
 
-    With h/256 or h/1024 where h/16 stops or leaves no digit.
+    With h/256 or h/2048 where h/16 stops or leaves no digit.
     """
     traits = next(m for m in METHODS if m.name == method)
     notes: list[str] = []

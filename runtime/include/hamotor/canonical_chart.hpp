@@ -9,6 +9,7 @@
 #include <array>
 #include <cstddef>
 #include <type_traits>
+#include <utility>
 
 #include "hamotor/compensated.hpp"
 #include "hamotor/scalar.hpp"
@@ -157,6 +158,48 @@ template <class G>
   return TurningPart<n>{};
 }
 
+/// One product of a bracket with a turn: out_k ± θ_i y_j.
+struct BracketTerm {
+  std::size_t k;
+  std::size_t i;
+  std::size_t j;
+  int sign;
+};
+
+/// Those of [θ, y], or of its transpose on momenta: `ad` and `coadjoint` multiply by all of ξ.
+template <class G, bool transposed>
+[[nodiscard]] constexpr auto turning_bracket() noexcept {
+  using S = long double;
+  constexpr auto n = static_cast<std::size_t>(G::dimension);
+  constexpr auto group = turning_part<G>();
+  const auto unit = []<class T>(T, std::size_t k) {
+    std::array<S, n> x{};
+    x[k] = 1;
+    return T::from(x);
+  };
+  struct {
+    std::array<BracketTerm, n * n * n> terms{};
+    std::size_t count = 0;
+  } found;
+  for (std::size_t j = 0; j < n; ++j) {
+    for (std::size_t i = 0; i < n; ++i) {
+      if (group.weights[i] == 0) continue;
+      const auto turn = unit(typename G::template Rate<S>{}, i);
+      std::array<S, n> result{};
+      if constexpr (transposed) {
+        result = coadjoint(turn, unit(typename G::template Momentum<S>{}, j)).components();
+      } else {
+        result = ad(turn, unit(typename G::template Rate<S>{}, j)).components();
+      }
+      for (std::size_t k = 0; k < n; ++k) {
+        const int sign = static_cast<int>(result[k]);
+        if (sign != 0) found.terms[found.count++] = {k, i, j, sign};
+      }
+    }
+  }
+  return found;
+}
+
 /// `turning_part` where the compiler can evaluate the group's `ad`.
 template <class G>
 struct TurningPartOf {
@@ -266,8 +309,8 @@ class CanonicalChart {
   /// M̂~M.
   [[nodiscard, gnu::flatten]] Element element() const noexcept {
     if constexpr (translates) {
-      const Rate one = ad(turn(), shift());
-      return exp(mul_add(inverse_square_, ad(turn(), one), mul_add(S(-0.5), one, xi_)));
+      const Rate one = bracket(turn(), shift());
+      return exp(mul_add(inverse_square_, bracket(turn(), one), mul_add(S(-0.5), one, xi_)));
     } else {
       return exp(xi_);
     }
@@ -277,43 +320,43 @@ class CanonicalChart {
   [[nodiscard, gnu::flatten]] Rate whole_logarithm() const noexcept {
     Rate half = xi_;
     if constexpr (translates) {
-      half = mul_add(-square_ / (f_.s * f_.k), ad(turn(), ad(turn(), shift())), half);
+      half = mul_add(-square_ / (f_.s * f_.k), bracket(turn(), bracket(turn(), shift())), half);
     }
     return S(2) * half;
   }
 
   /// ξ̇ for the body rate B; not finite at rotations by 2π.
   [[nodiscard, gnu::flatten]] Rate rate(const Rate& b) const noexcept {
-    const Rate one = ad(turn(), b);
-    const Rate two = ad(turn(), one);
+    const Rate one = bracket(turn(), b);
+    const Rate two = bracket(turn(), one);
     return joined(polynomial(b, one, two, S(0.5), inverse_square_),
                   polynomial(b, one, two, f_.s * f_.k, half_square_));
   }
 
   /// B for ξ̇.
   [[nodiscard, gnu::flatten]] Rate body_rate(const Rate& v) const noexcept {
-    const Rate one = ad(turn(), v);
-    const Rate two = ad(turn(), one);
+    const Rate one = bracket(turn(), v);
+    const Rate two = bracket(turn(), one);
     return joined(polynomial(v, one, two, -half_square_, square_),
                   polynomial(v, one, two, -f_.s * f_.k, half_square_));
   }
 
   /// p for m.
   [[nodiscard, gnu::flatten]] Momentum momentum(const Momentum& m) const noexcept {
-    const Momentum one = coadjoint(turn(), m);
-    return joined(polynomial(m, one, coadjoint(turn(), one), half_square_, square_), m);
+    const Momentum one = bracket(turn(), m);
+    return joined(polynomial(m, one, bracket(turn(), one), half_square_, square_), m);
   }
 
   /// m for p.
   [[nodiscard, gnu::flatten]] Momentum seen_from_center(const Momentum& p) const noexcept {
-    const Momentum one = coadjoint(turn(), p);
-    return joined(polynomial(p, one, coadjoint(turn(), one), S(-0.5), inverse_square_), p);
+    const Momentum one = bracket(turn(), p);
+    return joined(polynomial(p, one, bracket(turn(), one), S(-0.5), inverse_square_), p);
   }
 
   /// The body's momentum.
   [[nodiscard, gnu::flatten]] Momentum body_momentum(const Momentum& m) const noexcept {
-    const Momentum one = coadjoint(turn(), m);
-    return polynomial(m, one, coadjoint(turn(), one), f_.s * f_.k, half_square_);
+    const Momentum one = bracket(turn(), m);
+    return polynomial(m, one, bracket(turn(), one), f_.s * f_.k, half_square_);
   }
 
   /// ṗ where ξ̇ = v and ṁ is known.
@@ -321,10 +364,10 @@ class CanonicalChart {
                                                      const Momentum& m_rate) const noexcept {
     const S turns = S(2) * product(xi_, v);
     const Rate turning = group.template part<true>(v);
-    const Momentum one = coadjoint(turn(), m);
-    const Momentum two = coadjoint(turn(), one);
-    const Momentum d_one = coadjoint(turning, m) + coadjoint(turn(), m_rate);
-    const Momentum d_two = coadjoint(turning, one) + coadjoint(turn(), d_one);
+    const Momentum one = bracket(turn(), m);
+    const Momentum two = bracket(turn(), one);
+    const Momentum d_one = bracket(turning, m) + bracket(turn(), m_rate);
+    const Momentum d_two = bracket(turning, one) + bracket(turn(), d_one);
     const S half_slope = S(0.5) * f_.s * f_.d;
     const S square_slope = mul_add(S(0.125) * f_.s, f_.d, S(-1) * f_.k * f_.e);
     const Momentum sum = mul_add(square_, d_two, mul_add(half_square_, d_one, m_rate));
@@ -361,6 +404,24 @@ class CanonicalChart {
       }
     }
     return T::from(x);
+  }
+
+  /// [θ, y], or [μ, θ].
+  template <class T>
+  [[nodiscard]] static T bracket(const Rate& turn, const T& of) noexcept {
+    static constexpr auto bracket = detail::turning_bracket<G, std::is_same_v<T, Momentum>>();
+    const auto x = turn.components();
+    const auto y = of.components();
+    std::array<S, dimension> sum{};
+    [&]<std::size_t... t>(std::index_sequence<t...>) {
+      const auto add = [&]<std::size_t at>(std::integral_constant<std::size_t, at>) {
+        constexpr auto term = bracket.terms[at];
+        static_assert(term.sign == 1 || term.sign == -1);
+        sum[term.k] = mul_add(term.sign > 0 ? x[term.i] : -x[term.i], y[term.j], sum[term.k]);
+      };
+      (add(std::integral_constant<std::size_t, t>{}), ...);
+    }(std::make_index_sequence<bracket.count>{});
+    return T::from(sum);
   }
 
   [[nodiscard]] Rate turn() const noexcept { return group.template part<true>(xi_); }
