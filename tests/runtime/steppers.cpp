@@ -72,6 +72,12 @@ long double apart_without_rates(const System& system) {
   return distance(one, other);
 }
 
+TEST(Rk4, a_step_of_no_length_leaves_the_state) {
+  const auto system = sample::forced_so3();
+  const auto start = generic_state(system);
+  EXPECT_LT(distance(start, stepped<Rk4<decltype(system)>>(system, start, 0.0, 1)), 1e-15);
+}
+
 TEST(Rk4, steps_rates_as_it_steps_momenta) {
   EXPECT_LT(apart_without_rates(sample::free_so3()), 3e-15);
   EXPECT_LT(apart_without_rates(sample::free_se3()), 3e-15);

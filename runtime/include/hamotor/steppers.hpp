@@ -452,7 +452,8 @@ class RateStages {
 
   /// What slopes are to be multiplied by for h μ̇/6.
   [[nodiscard]] HAMOTOR_INLINE constexpr typename System::Momenta sixth() const noexcept {
-    return system_.momentum_weights(S(1) / (S(1.5) * unit_));
+    const S whole = S(1.5) * unit_;
+    return system_.momentum_weights(select(whole == S(0), S(0), S(1) / whole));
   }
 
  private:
