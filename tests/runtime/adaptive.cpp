@@ -369,4 +369,15 @@ TEST(Adaptive, gives_no_number_for_a_tolerance_below_rounding) {
   EXPECT_EQ(method.failure(), hamotor::Failure::step_too_short);
 }
 
+TEST(Adaptive, ends_where_rounding_is_all_that_it_estimates) {
+  const auto system = sample::free_so3<double>();
+  for (int k = 0; k < 40; ++k) {
+    auto state = generic_state(system);
+    state.momenta[0] = 20 * state.momenta[0];
+    Adaptive<Of<decltype(system)>, Rkmk87<Of<decltype(system)>>> method(3.6e-15 * (1 + 0.01 * k));
+    method.do_step(system, state, 0, 10);
+    EXPECT_LT(method.tried(), 20000) << k;  // 2200 would do at a tolerance that can be had
+  }
+}
+
 }  // namespace

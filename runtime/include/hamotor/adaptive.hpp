@@ -179,15 +179,21 @@ class Adaptive {
   }
 
   /// One step ahead, of whatever length is accepted; false where none can be that counts beside the
-  /// time and h.
+  /// time and h, or where shorter ones would not be better.
   [[nodiscard]] constexpr bool advance(const System& system, const S& h) noexcept {
     const auto account = method_.account();
+    const S least = scalar::Limits<S>::epsilon() * scalar::max_abs(ahead_.time, h);
+    S ratio(0);
+    S allowed(0);  // for the next ratio: what an error as the square of the step would give
     for (bool refused = false;; refused = true) {
+      if (!(scalar::abs(proposed_) > least)) {
+        return stop(ratio - ratio == S(0) ? Failure::step_too_short : Failure::not_finite);
+      }
       Mark next = ahead_;
       method_.do_step(system, next.state, ahead_.time, proposed_);
       next.time = ahead_.time + proposed_;
       ++tried_;
-      const S ratio = method_.error() / (tolerance_ * scalar::abs(proposed_));
+      ratio = method_.error() / (tolerance_ * scalar::abs(proposed_));
       S factor = factor_for(ratio);
       if (ratio <= S(1)) {
         before_ = ahead_;
@@ -198,14 +204,34 @@ class Adaptive {
         return true;
       }
       method_.go_back(account);
+      // Where rounding is all that is estimated, luck would take steps of any length, the time ahead
+      // by next to nothing.
+      if (refused && ratio > allowed && tolerance_ * ratio < rounding(system)) {
+        return stop(Failure::step_too_short);
+      }
+      allowed = factor * ratio;
       proposed_ = factor * proposed_;
-      const S least = scalar::Limits<S>::epsilon() * scalar::max_abs(ahead_.time, h);
-      if (!(scalar::abs(proposed_) > least)) {
-        failure_ = ratio - ratio == S(0) ? Failure::step_too_short : Failure::not_finite;
-        proposed_ = S(0);
-        return false;
+    }
+  }
+
+  [[nodiscard]] constexpr bool stop(Failure why) noexcept {
+    failure_ = why;
+    proposed_ = S(0);
+    return false;
+  }
+
+  /// More than rounding of slopes makes of an error a unit of time, s⁻¹, ahead.
+  [[nodiscard]] constexpr S rounding(const System& system) const noexcept {
+    const Change by = change(system, ahead_.state, ahead_.time);
+    S fastest(0);
+    for (std::size_t i = 0; i < System::bodies; ++i) {
+      fastest = scalar::max_abs(fastest, detail::largest(by.motors[i]));
+      const S size = detail::largest(ahead_.state.momenta[i]);
+      if (size > S(0)) {
+        fastest = scalar::max_abs(fastest, detail::largest(by.momenta[i]) / size);
       }
     }
+    return S(64) * scalar::Limits<S>::epsilon() * fastest;
   }
 
   constexpr void deliver(const System& system, StateOf<System>& state, const S& target,
