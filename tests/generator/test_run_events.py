@@ -162,6 +162,15 @@ def test_a_time_limit_keeps_what_was_computed(stone: hamotor.Simulation) -> None
     assert run.report["failure"]["t"] == run.report["t_end"] == run.t[-1] < 0
 
 
+def test_a_time_limit_passes_within_one_step(stone: hamotor.Simulation) -> None:
+    with pytest.raises(RunFailed, match="time limit passed after step 0 of 1 ") as caught:
+        stone.run(end=-1e9, step=-1e9, method="taylor", local_tolerance=1e-9, time_limit=0.2)
+    run = caught.value.run
+    assert run.report["failure"]["reason"] == "time_limit"
+    assert run.t.tolist() == [0.0]
+    assert run.report["timing"]["integrate_s"] < 2
+
+
 def test_the_quantity_that_fails_is_named(stone: hamotor.Simulation) -> None:
     with pytest.raises(RunFailed, match=r"became non-finite in step .* with a step of") as caught:
         stone.run(end=-1e305, step=1e300)

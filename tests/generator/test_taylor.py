@@ -395,6 +395,25 @@ def test_dense_output_costs_no_steps_and_no_digits(problems: Callable[[str], Any
         assert np.abs(run.state() - at_the_end).max() < 1e-12
 
 
+def test_a_step_in_parts_ends_in_the_same_bits(problems: Callable[[str], Any]) -> None:
+    library, start, _ = problems("P4")
+    with library.start("taylor", step=5.0, state=start, tolerance=1e-13) as run:
+        assert run.advance(2, 0, None) == 2
+        taken, there = run.steps(), run.state()
+    with library.start("taylor", step=5.0, state=start, tolerance=1e-13) as run:
+        run.set_patience(3)
+        calls = done = 0
+        while done < 2:
+            before = run.state()
+            done += (more := run.advance(2 - done, 0, None))
+            calls += 1
+            assert run.steps() <= 4 * calls
+            assert more or np.array_equal(run.state(), before)
+        assert calls > taken / 6 > 1
+        assert run.steps() == taken
+        np.testing.assert_array_equal(run.state(), there)
+
+
 def test_the_account_of_work_is_a_coordinate() -> None:
     simulation = hamotor.load("rocket")
     library = simulation.compile(method="taylor").library

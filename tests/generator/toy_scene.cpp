@@ -159,6 +159,8 @@ EXPORT void* hamotor_start_text(const char*, double, const char*) { return nullp
 
 EXPORT std::int64_t hamotor_observe_text(const void*, char*, std::int64_t) { return 0; }
 
+EXPORT void hamotor_set_patience(void*, std::int64_t) {}
+
 EXPORT std::int32_t hamotor_observe_at(const void* handle, double time, double* row) {
   Run run = *static_cast<const Run*>(handle);
   run.step = time - (run.start + run.step * static_cast<double>(run.index));

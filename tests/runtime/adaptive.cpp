@@ -369,6 +369,25 @@ TEST(Adaptive, gives_no_number_for_a_tolerance_below_rounding) {
   EXPECT_EQ(method.failure(), hamotor::Failure::step_too_short);
 }
 
+TEST(Adaptive, goes_on_to_the_same_bits_from_where_its_patience_ended) {
+  const auto system = sample::forced_se3();
+  auto at_once = generic_state(system);
+  auto in_parts = at_once;
+  Adaptive<Of<decltype(system)>> whole(1e-9);
+  Adaptive<Of<decltype(system)>> patient(1e-9);
+  whole.do_step(system, at_once, 0, 1);
+  patient.set_patience(7);
+  long long calls = 0;
+  do {
+    EXPECT_EQ(in_parts, generic_state(system));
+    patient.do_step(system, in_parts, 0, 1);
+    EXPECT_LE(patient.tried(), 8 * ++calls);
+  } while (patient.paused());
+  EXPECT_GT(calls, 2);
+  EXPECT_EQ(in_parts, at_once);
+  EXPECT_EQ(patient.tried(), whole.tried());
+}
+
 TEST(Adaptive, ends_where_rounding_is_all_that_it_estimates) {
   const auto system = sample::free_so3<double>();
   for (int k = 0; k < 40; ++k) {

@@ -232,6 +232,7 @@ class SceneLibrary:
             "hamotor_describe": (ctypes.c_char_p, []),
             "hamotor_start": (run, [ctypes.c_char_p, number, number, number, numbers]),
             "hamotor_advance": (whole, [run, whole, whole, numbers]),
+            "hamotor_set_patience": (None, [run, whole]),
             "hamotor_observe": (None, [run, numbers]),
             "hamotor_start_text": (run, [ctypes.c_char_p, number, ctypes.c_char_p]),
             "hamotor_observe_text": (whole, [run, ctypes.c_char_p, whole]),
@@ -417,11 +418,18 @@ class LiveRun:
 
         After each step whose index since the start is a multiple of `every`, one row is written
         into `rows`, shape (≥ rows due, columns), C-contiguous float64; None records nothing.
-        Fewer steps than asked for means that an event happened in the last of them, or that
-        the next one failed.
+        Fewer steps than asked for means that an event happened in the last of them, that the next
+        one failed, or that it takes more than patience.
         """
         target = None if rows is None else _pointer(rows)
         return int(self._c.hamotor_advance(self._handle, steps, every, target))
+
+    def set_patience(self, tries: int) -> None:
+        """Have `advance` return early from a step that takes more than so many of the method's own.
+
+        The next call goes on with it, to the same bits.  0, as in the beginning, for no limit.
+        """
+        self._c.hamotor_set_patience(self._handle, tries)
 
     def observe(self) -> Vector:
         """One row of the trajectory for the state now, shape (columns,)."""

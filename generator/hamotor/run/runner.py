@@ -38,6 +38,7 @@ Status = Literal["finished", "interrupted", "failed"]
 _CHUNK_S = 0.1
 _FIRST_CHUNK_STEPS = 64
 _LARGEST_GROWTH = 8
+_FIRST_PATIENCE = 256
 _ROWS_PER_CHUNK = 1 << 15
 _MOST_STEPS = 10**15
 _VANISHING = 1e-12
@@ -339,7 +340,8 @@ def integrate(
     The first row is the initial state, the last the final one, whether or not `every` divides the
     number of steps; where the plan has times, rows are at those alone.  A step that fails ends the
     run with status "failed", as does `deadline` (of `time.perf_counter`) between two chunks: rows
-    up to then are kept.  The recorder is closed.
+    up to then are kept.  A step in which the method takes many of its own is done in chunks as
+    well.  The recorder is closed.
     """
     interruption = Interruption() if interruption is None else interruption
     progress = NoProgress() if progress is None else progress
@@ -371,7 +373,8 @@ class _Stepping:
     def run(self, progress: Progress, interruption: Interruption, deadline: float) -> Outcome:
         """Step to the end, or as far as it goes."""
         plan, kept = self.plan, self.kept
-        chunk = _FIRST_CHUNK_STEPS
+        chunk, patience = _FIRST_CHUNK_STEPS, _FIRST_PATIENCE
+        self.live.set_patience(patience)
         interrupted = late = False
         while self.done < plan.steps and not self.breakdown and not self.stopped:
             if interruption.asked:
@@ -387,9 +390,14 @@ class _Stepping:
             self._observe_due()
             if self.due:
                 asked = min(asked, self.due.index - self.done)
+            before = self.done
             spent = self._advance(asked)
             progress.advance(self.done, self.seconds)
-            chunk = _next_chunk(asked, spent) if spent else chunk
+            if spent and self.done > before:
+                chunk = _next_chunk(asked, spent)
+            elif spent:  # within a step that takes long
+                chunk, patience = 1, _next_chunk(patience, spent)
+                self.live.set_patience(patience)
         if not self.breakdown and not self.stopped:
             self._observe_due()
             self.breakdown = kept.flush()

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <string_view>
+#include <utility>
 
 #include "hamotor/rkmk.hpp"
 #include "hamotor/scalar.hpp"
@@ -34,10 +35,17 @@ class Adaptive {
   /// Asks for this local error a unit of time, s⁻¹; 0 for one step a call.
   constexpr void set_tolerance(const S& tolerance) noexcept { tolerance_ = tolerance; }
 
+  /// Has a call that would try more steps than this stop on its way; 0 for none.
+  constexpr void set_patience(long long tries) noexcept { patience_ = tries; }
+
+  /// Whether the last call stopped on its way: its state is as it was, and the same call goes on.
+  [[nodiscard]] constexpr bool paused() const noexcept { return paused_; }
+
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
     failure_ = Failure::none;
+    paused_ = false;
     if (!(tolerance_ > S(0))) {
       method_.do_step(system, state, t, h);
       if constexpr (PoweredSystem<System>) work_ = method_.work();
@@ -50,7 +58,7 @@ class Adaptive {
 
   /// The state after the part `part` of a step from `state`, t to t + h, and the work done until
   /// then; that step may follow as if this had not been asked.  What has to be found for it is kept
-  /// for the step, so that it is found once.
+  /// for the step, so that it is found once; that is never paused.
   constexpr StateOf<System> look(const System& system, const StateOf<System>& state, const S& t,
                                  const S& h, const S& part, S& work) noexcept {
     StateOf<System> there = state;
@@ -58,12 +66,16 @@ class Adaptive {
     const S direction = scalar::sign(h);
     if (!(tolerance_ > S(0)) || direction * (target - before_.time) < S(0)) {
       Adaptive aside = *this;
+      aside.set_patience(0);
       aside.do_step(system, there, t, part);
       work = aside.work_;
       return there;
     }
     const S work_before = work_;
+    const long long patience = std::exchange(patience_, 0);
     reach(system, there, t, h, target);
+    patience_ = patience;
+    paused_ = false;
     work = work_;
     work_ = work_before;
     delivered_ = state;
@@ -105,7 +117,14 @@ class Adaptive {
     if (is_past || !goes_on(state, t, direction)) start(system, state, t, h);
     // Times that differ by rounding are the same.
     const S slack = S(4) * scalar::Limits<S>::epsilon() * scalar::max_abs(target, ahead_.time, h);
+    const long long last = tried_ + patience_;
     while (direction * (target - ahead_.time) > slack) {
+      if (patience_ > 0 && tried_ >= last) {
+        paused_ = true;
+        delivered_ = state;
+        delivered_time_ = t;
+        return;
+      }
       if (!advance(system, h)) {
         for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
         delivered_ = state;
@@ -204,8 +223,8 @@ class Adaptive {
         return true;
       }
       method_.go_back(account);
-      // Where rounding is all that is estimated, luck would take steps of any length, the time ahead
-      // by next to nothing.
+      // Where rounding is all that is estimated, luck would take steps of any length, the time
+      // ahead by next to nothing.
       if (refused && ratio > allowed && tolerance_ * ratio < rounding(system)) {
         return stop(Failure::step_too_short);
       }
@@ -270,6 +289,8 @@ class Adaptive {
   Failure failure_ = Failure::none;
   long long tried_ = 0;
   long long taken_ = 0;
+  long long patience_ = 0;
+  bool paused_ = false;
 };
 
 }  // namespace hamotor

@@ -467,6 +467,9 @@ class Run {
     }
   }
 
+  /// No method of this form takes steps of its own.
+  static void set_patience(std::int64_t /*tries*/) noexcept {}
+
   /// As `scene::Run::advance`.
   [[nodiscard]] std::int64_t advance(std::int64_t steps, std::int64_t every,
                                      double* rows) noexcept {

@@ -645,9 +645,19 @@ class Run {
       const std::type_identity_t<Number>& step, const Number* state) noexcept
       : method_(method), time_(S(time)), step_(S(step)), state_(Moment::from_user(state)) {}
 
+  /// Has `advance` return early rather than try more than this many of the method's own steps in
+  /// one of the run's: the next call goes on.  0, as in the beginning, for none.
+  void set_patience(std::int64_t tries) noexcept {
+    std::visit(
+        [&](auto& method) {
+          if constexpr (Patient<std::remove_cvref_t<decltype(method)>>) method.set_patience(tries);
+        },
+        method_);
+  }
+
   /// Up to `steps` steps; a row after each whose index is a multiple of `every`.  Returns the steps
-  /// done: fewer mean that an event happened in the last of them, or that the next one failed; the
-  /// state is then the last that is good.
+  /// done: fewer mean that an event happened in the last of them, that the next one failed or that
+  /// it takes more than patience; the state is then the last that is good.
   [[nodiscard]] std::int64_t advance(std::int64_t steps, std::int64_t every,
                                      double* rows) noexcept {
     return std::visit([&](auto& method) { return advance_with(method, steps, every, rows); },
@@ -675,7 +685,7 @@ class Run {
               return observe(there, row);
             }
           }
-          auto aside = method;
+          auto aside = unhurried(method);
           aside.do_step(Scene::system, there.state, now(), part);
           there.work = work_of(aside);
           return observe(there, row);
@@ -722,6 +732,9 @@ class Run {
     for (std::int64_t done = 0; done < steps; ++done) {
       [[maybe_unused]] const auto before = if_eventful(method);
       method.do_step(Scene::system, state, now(), step_);
+      if constexpr (Patient<Method>) {
+        if (method.paused()) return done;
+      }
       if (!is_finite(state)) {
         failure_ = reason_of(method);
         component_ = first_not_finite(state);
@@ -755,10 +768,17 @@ class Run {
     }
   }
 
+  /// The method as it is, but for steps to their end.
+  template <class Method>
+  [[nodiscard]] static Method unhurried(Method method) noexcept {
+    if constexpr (Patient<Method>) method.set_patience(0);
+    return method;
+  }
+
   template <class Method>
   [[nodiscard]] static auto if_eventful([[maybe_unused]] const Method& method) noexcept {
     if constexpr (EventfulScene<Scene>) {
-      return method;
+      return unhurried(method);
     } else {
       return 0;
     }
@@ -898,6 +918,9 @@ template <class Scene>
   HAMOTOR_SCENE_EXPORT std::int64_t hamotor_advance(void* run, std::int64_t steps,              \
                                                     std::int64_t every, double* rows) {         \
     return static_cast<hamotor::scene::RunOf<Scene>*>(run)->advance(steps, every, rows);        \
+  }                                                                                             \
+  HAMOTOR_SCENE_EXPORT void hamotor_set_patience(void* run, std::int64_t tries) {               \
+    static_cast<hamotor::scene::RunOf<Scene>*>(run)->set_patience(tries);                       \
   }                                                                                             \
   HAMOTOR_SCENE_EXPORT void hamotor_observe(const void* run, double* row) {                     \
     static_cast<const hamotor::scene::RunOf<Scene>*>(run)->observe(row);                        \

@@ -259,6 +259,16 @@ concept ErrorControlled = requires(Method method, const Method& constant, const 
   { constant.steps() } -> std::convertible_to<long long>;
 };
 
+/// A stepper that takes steps of its own and can stop on the way to where it is asked for.
+///
+/// After `set_patience(n)` a call of `do_step` that would try more than n of them ends early, with
+/// the state as it was, and `paused()` is true: the same call again goes on, to the same bits.
+template <class Method>
+concept Patient = requires(Method method, const Method& constant, long long tries) {
+  { method.set_patience(tries) } -> std::same_as<void>;
+  { constant.paused() } -> std::same_as<bool>;
+};
+
 /// Why a run could not take a step.  What a stepper says so of has momenta that are not numbers.
 enum class Failure {
   none,

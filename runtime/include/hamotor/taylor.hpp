@@ -93,14 +93,24 @@ class Taylor {
     known_ = false;
   }
 
+  /// Has a call that would take more expansions than this stop on its way; 0 for none.
+  constexpr void set_patience(long long expansions) noexcept { patience_ = expansions; }
+
+  /// Whether the last call stopped on its way: its state is as it was, and the same call goes on.
+  [[nodiscard]] constexpr bool paused() const noexcept { return paused_; }
+
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& /*system*/, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
     failure_ = Failure::none;
-    if (!(known_ && state == delivered_ && is_near(t, time_, h))) start(state, t);
-    time_ = t + h;
-    offset_ = offset_ + h;
+    const bool goes_on = known_ && state == delivered_ && is_near(t, time_, h);
+    if (!goes_on || (paused_ && h != asked_)) start(state, t);
+    if (!paused_) offset_ = offset_ + h;
+    asked_ = h;
+    const long long last = steps_ + patience_;
     while (scalar::abs(offset_) > reach_) {
+      paused_ = patience_ > 0 && steps_ >= last;
+      if (paused_) return;
       const S step = select(offset_ > S(0), reach_, -reach_);
       if (!(reach_ > scalar::Limits<S>::epsilon() * scalar::abs(t))) {
         return fail(state, step - step == S(0) ? Failure::step_too_short : Failure::not_finite);
@@ -109,6 +119,8 @@ class Taylor {
       offset_ = offset_ - step;
     }
     if (!(reach_ > S(0))) return fail(state, Failure::not_finite);
+    paused_ = false;
+    time_ = t + h;
     const Coordinates change = increment(offset_);
     Coordinates x = coefficients_[0];
     for (std::size_t i = 0; i < n; ++i) x[i] = x[i] + (change[i] + low_[i]);
@@ -162,6 +174,9 @@ class Taylor {
 
   constexpr void start(const StateOf<System>& state, const S& t) noexcept {
     known_ = true;
+    paused_ = false;
+    delivered_ = state;
+    time_ = t;
     coefficients_[0] = Recurrence::enter(state, t);
     low_ = {};
     defects_ = {};
@@ -396,14 +411,17 @@ class Taylor {
   S unit_ = S(1);
   S reach_ = S(0);
   S offset_ = S(0);
+  S asked_ = S(0);
   S time_ = S(0);
   S work_{};
   S work_before_{};
   Drift<S> drift_;
   long long steps_ = 0;
+  long long patience_ = 0;
   int length_ = order;
   Failure failure_ = Failure::none;
   bool known_ = false;
+  bool paused_ = false;
 };
 
 }  // namespace hamotor
