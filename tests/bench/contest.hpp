@@ -71,6 +71,11 @@ struct Momentum {
 struct Body {
   using Exact = bench::Body<Quad>;
 };
+/// A motion held as its matrix on things of a kind: it is given, and the time to make it is not.
+template <class Kind>
+struct MatrixOn {
+  using Exact = pga3::Motor<Quad>;
+};
 struct Nothing {};
 }  // namespace kind
 
@@ -94,6 +99,10 @@ class Source {
   explicit Source(std::uint64_t seed) : engine_(seed) {}
 
   [[nodiscard]] pga3::Motor<Quad> make(kind::Motion);
+  template <class Kind>
+  [[nodiscard]] pga3::Motor<Quad> make(kind::MatrixOn<Kind>) {
+    return make(kind::Motion{});
+  }
   [[nodiscard]] pga3::Point<Quad> make(kind::Point);
   [[nodiscard]] pga3::Direction<Quad> make(kind::Direction);
   [[nodiscard]] pga3::Plane<Quad> make(kind::Plane);
@@ -158,6 +167,29 @@ struct MovePlane : Move<kind::Plane> {
 };
 struct MoveLine : Move<kind::Line> {
   static constexpr const char* name = "line";
+};
+template <class Kind>
+struct Transform {
+  using A = kind::MatrixOn<Kind>;
+  using B = Kind;
+  using Result = Kind;
+  template <class C>
+  HAMOTOR_INLINE static constexpr auto run(const auto& m, const auto& x)
+      -> decltype(C::transform(Kind{}, m, x)) {
+    return C::transform(Kind{}, m, x);
+  }
+};
+struct TransformPoint : Transform<kind::Point> {
+  static constexpr const char* name = "point, matrix given";
+};
+struct TransformDirection : Transform<kind::Direction> {
+  static constexpr const char* name = "direction, matrix given";
+};
+struct TransformPlane : Transform<kind::Plane> {
+  static constexpr const char* name = "plane, matrix given";
+};
+struct TransformLine : Transform<kind::Line> {
+  static constexpr const char* name = "line, matrix given";
 };
 struct Commutator {
   static constexpr const char* name = "commutator";
@@ -479,6 +511,10 @@ void enter() {
   enter_for<C, operation::MoveDirection>();
   enter_for<C, operation::MovePlane>();
   enter_for<C, operation::MoveLine>();
+  enter_for<C, operation::TransformPoint>();
+  enter_for<C, operation::TransformDirection>();
+  enter_for<C, operation::TransformPlane>();
+  enter_for<C, operation::TransformLine>();
   enter_for<C, operation::Commutator>();
   enter_for<C, operation::Coadjoint>();
   enter_for<C, operation::Exp>();

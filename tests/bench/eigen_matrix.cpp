@@ -21,6 +21,10 @@ struct Isometry : Vectors<S> {
     motion.translation() = three<S>(sandwich(m, pga3::Origin<Quad>{}).components());
     return motion;
   }
+  template <class Kind>
+  [[nodiscard]] static Motion make(kind::MatrixOn<Kind>, const pga3::Motor<Quad>& m) {
+    return make(kind::Motion{}, m);
+  }
   [[nodiscard]] static Values exact(kind::Motion, const Motion& m) {
     return Vectors<S>::images(m.linear(), m.translation());
   }
@@ -28,20 +32,21 @@ struct Isometry : Vectors<S> {
   [[nodiscard]] HAMOTOR_INLINE static Motion compose(const Motion& a, const Motion& b) {
     return a * b;
   }
-  [[nodiscard]] HAMOTOR_INLINE static Vector3<S> move(kind::Point, const Motion& m,
-                                                      const Vector3<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Vector3<S> transform(kind::Point, const Motion& m,
+                                                           const Vector3<S>& x) {
     return m * x;
   }
-  [[nodiscard]] HAMOTOR_INLINE static Vector3<S> move(kind::Direction, const Motion& m,
-                                                      const Vector3<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Vector3<S> transform(kind::Direction, const Motion& m,
+                                                           const Vector3<S>& x) {
     return m.linear() * x;
   }
-  [[nodiscard]] HAMOTOR_INLINE static PlaneOf<S> move(kind::Plane, const Motion& m,
-                                                      const PlaneOf<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static PlaneOf<S> transform(kind::Plane, const Motion& m,
+                                                           const PlaneOf<S>& x) {
     const Vector3<S> normal = m.linear() * x.normal;
     return {normal, x.distance - normal.dot(m.translation())};
   }
-  [[nodiscard]] HAMOTOR_INLINE static Pair<S> move(kind::Line, const Motion& m, const Pair<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Pair<S> transform(kind::Line, const Motion& m,
+                                                        const Pair<S>& x) {
     const Vector3<S> direction = m.linear() * x.first;
     return {direction, m.linear() * x.second + m.translation().cross(direction)};
   }
@@ -104,7 +109,7 @@ struct ConvertedIsometry : Vectors<S> {
     matrix.linear() = m.rotation.toRotationMatrix();
     matrix.translation() = m.translation;
     matrix.makeAffine();
-    return Isometry<S>::move(kind, matrix, x);
+    return Isometry<S>::transform(kind, matrix, x);
   }
 };
 
@@ -116,6 +121,10 @@ struct Homogeneous {
 
   [[nodiscard]] static Motion make(kind::Motion, const pga3::Motor<Quad>& m) {
     return Isometry<S>::make(kind::Motion{}, m).matrix();
+  }
+  template <class Kind>
+  [[nodiscard]] static Motion make(kind::MatrixOn<Kind>, const pga3::Motor<Quad>& m) {
+    return make(kind::Motion{}, m);
   }
   [[nodiscard]] static Vector4<S> make(kind::Point, const pga3::Point<Quad>& x) {
     return {static_cast<S>(x.e032), static_cast<S>(x.e013), static_cast<S>(x.e021), S(1)};
@@ -151,12 +160,12 @@ struct Homogeneous {
   [[nodiscard]] HAMOTOR_INLINE static Motion compose(const Motion& a, const Motion& b) {
     return a * b;
   }
-  [[nodiscard]] HAMOTOR_INLINE static Vector4<S> move(kind::Point, const Motion& m,
-                                                      const Vector4<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Vector4<S> transform(kind::Point, const Motion& m,
+                                                           const Vector4<S>& x) {
     return m * x;
   }
-  [[nodiscard]] HAMOTOR_INLINE static Vector4<S> move(kind::Direction, const Motion& m,
-                                                      const Vector4<S>& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Vector4<S> transform(kind::Direction, const Motion& m,
+                                                           const Vector4<S>& x) {
     return m * x;
   }
   [[nodiscard]] HAMOTOR_INLINE static Matrix4<S> commutator(const Matrix4<S>& a,
@@ -175,10 +184,7 @@ struct Homogeneous {
 
 void enter_eigen_matrix() {
   enter<Isometry>();
-  enter_for<ConvertedIsometry, operation::MovePoint>();
-  enter_for<ConvertedIsometry, operation::MoveDirection>();
-  enter_for<ConvertedIsometry, operation::MovePlane>();
-  enter_for<ConvertedIsometry, operation::MoveLine>();
+  enter<ConvertedIsometry>();
   enter<Homogeneous>();
 }
 

@@ -16,6 +16,10 @@ struct Generated {
   [[nodiscard]] static auto make(Kind, const typename Kind::Exact& x) {
     return x.template cast<S>();
   }
+  template <class Kind>
+  [[nodiscard]] static auto make(kind::MatrixOn<Kind> kind, const pga3::Motor<Quad>& m) {
+    return matrix(kind, m).template cast<S>();
+  }
   [[nodiscard]] static Body<S> make(kind::Body, const Body<Quad>& x) {
     return {x.motion.template cast<S>(), x.momentum.template cast<S>()};
   }
@@ -32,6 +36,26 @@ struct Generated {
   }
   template <class Kind>
   [[nodiscard]] HAMOTOR_INLINE static auto move(Kind, const Motion& m, const auto& x) {
+    return sandwich(m, x);
+  }
+  [[nodiscard]] HAMOTOR_INLINE static auto matrix(kind::MatrixOn<kind::Point>, const auto& m) {
+    return point_matrix(m);
+  }
+  [[nodiscard]] HAMOTOR_INLINE static auto matrix(kind::MatrixOn<kind::Direction>, const auto& m) {
+    return direction_matrix(m);
+  }
+  [[nodiscard]] HAMOTOR_INLINE static auto matrix(kind::MatrixOn<kind::Plane>, const auto& m) {
+    return plane_matrix(m);
+  }
+  [[nodiscard]] HAMOTOR_INLINE static auto matrix(kind::MatrixOn<kind::Line>, const auto& m) {
+    return bivector_matrix(m);
+  }
+  template <class Kind>
+  [[nodiscard]] HAMOTOR_INLINE static auto transform(Kind, const auto& a, const auto& x) {
+    return pga3::transform(a, x);
+  }
+  template <class Kind>
+  [[nodiscard]] static auto transform(Kind, const Motion& m, const auto& x) {
     return sandwich(m, x);
   }
   [[nodiscard]] HAMOTOR_INLINE static auto commutator(const pga3::Bivector<S>& a,
@@ -81,6 +105,17 @@ struct Generated {
   }
 };
 
+/// The matrix of a motor, made anew by each operation.
+template <class S>
+struct GeneratedConverted : Generated<S> {
+  static constexpr const char* name = "generated, converted";
+
+  template <class Kind>
+  [[nodiscard]] HAMOTOR_INLINE static auto move(Kind, const pga3::Motor<S>& m, const auto& x) {
+    return pga3::transform(Generated<S>::matrix(kind::MatrixOn<Kind>{}, m), x);
+  }
+};
+
 /// The forms with the fewest operations, accurate where nothing is extreme.
 template <class S>
 struct GeneratedLean : Generated<S> {
@@ -108,6 +143,14 @@ template Values reference<operation::MoveDirection>(const pga3::Motor<Quad>&,
 template Values reference<operation::MovePlane>(const pga3::Motor<Quad>&, const pga3::Plane<Quad>&);
 template Values reference<operation::MoveLine>(const pga3::Motor<Quad>&,
                                                const pga3::Bivector<Quad>&);
+template Values reference<operation::TransformPoint>(const pga3::Motor<Quad>&,
+                                                     const pga3::Point<Quad>&);
+template Values reference<operation::TransformDirection>(const pga3::Motor<Quad>&,
+                                                         const pga3::Direction<Quad>&);
+template Values reference<operation::TransformPlane>(const pga3::Motor<Quad>&,
+                                                     const pga3::Plane<Quad>&);
+template Values reference<operation::TransformLine>(const pga3::Motor<Quad>&,
+                                                    const pga3::Bivector<Quad>&);
 template Values reference<operation::Commutator>(const pga3::Bivector<Quad>&,
                                                  const pga3::Bivector<Quad>&);
 template Values reference<operation::Coadjoint>(const pga3::se3::Rate<Quad>&,
@@ -122,6 +165,10 @@ template Values reference<operation::Splitting2>(const kind::Nothing&, const Bod
 
 void enter_generated() {
   enter<Generated>();
+  enter_for<GeneratedConverted, operation::MovePoint>();
+  enter_for<GeneratedConverted, operation::MoveDirection>();
+  enter_for<GeneratedConverted, operation::MovePlane>();
+  enter_for<GeneratedConverted, operation::MoveLine>();
   enter_for<GeneratedLean, operation::Exp>();
   enter_for<GeneratedLean, operation::Log>();
   enter_for<GeneratedLean, operation::ExpLog>();

@@ -145,10 +145,11 @@ def test_every_operation_is_measured_and_every_contestant_agrees(
     found = bench_kernels(tmp_path, quick=True)
     measured = {(r["operation"], r["contestant"]) for r in found["rows"]}
     assert {operation for operation, _ in measured} == {
-        "motor product", "point", "direction", "plane", "line", "commutator", "coadjoint", "exp",
-        "log", "exp of log", "normalize", "RK4 step", "rkmk4 step", "splitting2 step",
-        "cga3 even product", "cga3 versor product", "cga3 vector", "cga3 bivector",
-        "cga3 bivector trivector", "cga3 exp",
+        "motor product", "point", "direction", "plane", "line", "point, matrix given",
+        "direction, matrix given", "plane, matrix given", "line, matrix given", "commutator",
+        "coadjoint", "exp", "log", "exp of log", "normalize", "RK4 step", "rkmk4 step",
+        "splitting2 step", "cga3 even product", "cga3 versor product", "cga3 vector",
+        "cga3 bivector", "cga3 bivector trivector", "cga3 exp",
     }  # fmt: skip
     assert all((operation, "generated") in measured for operation, _ in measured)
     assert all(r["ns"] > 0 and r["max_relative_error"] < 1e-13 for r in found["rows"])

@@ -82,9 +82,24 @@ class Library:
         self.oracle = Oracle([[Fraction(x) for x in row] for row in index["gram"]])
         self.elements = {e["name"]: self._element(e) for e in index["elements"]}
         self.kernels: list[dict[str, Any]] = index["kernels"]
-        self.polynomial = [k for k in self.kernels if k["polynomial"]]
+        # A matrix is determined by its images, one by one: together they are a sandwich.
+        self.polynomial = [
+            self._whole(k)
+            for k in self.kernels
+            if k["polynomial"] and not k["name"].endswith("_matrix")
+        ]
         self._moved = cache(self._moved_blade)
         self.versors = cache(self._versors)
+
+    def _whole(self, kernel: dict[str, Any]) -> dict[str, Any]:
+        """The kernel; of a matrix's application to an element, both steps in one."""
+        if kernel["name"] != "transform":
+            return kernel
+        matrix, operand = kernel["operands"]
+        ((first, versor),) = {
+            (k["name"], *k["operands"]) for k in self.kernels if k["result"] == matrix
+        }
+        return kernel | {"operands": [versor, operand], "first": first}
 
     def _blade(self, name: str) -> Blade:
         if name == "s":
@@ -148,6 +163,7 @@ class Library:
             "unit_defect_change": lambda m, x: added(o.gp(m, o.reverse(x)), o.gp(x, o.reverse(m))),
             "unit_correction": lambda m, d: scaled(Fraction(-1, 2), o.gp(d, m)),
             "sandwich": self.sandwich,
+            "transform": self.sandwich,
             "ad": self.bracket,
             "coadjoint": lambda w, mu: self.bracket(mu, w),
             "kinematics": o.gp,
@@ -308,7 +324,7 @@ class Library:
             sums += [_random(dice, element) for _ in range(20)]
             return [(point,) for point in sums]
         choices: list[Sequence[Point]] = [element.basis() for element in operands]
-        if kernel["name"] in ("sandwich", "Ad", "Ad_star_inverse"):
+        if kernel["name"] in ("sandwich", "transform", "Ad", "Ad_star_inverse"):
             choices[0] = self.versors(operands[0].name)
             extra = [(dice.choice(choices[0]), _random(dice, operands[1])) for _ in range(20)]
             return [*product(*choices), *extra]
@@ -367,7 +383,10 @@ def source(library: Library) -> str:
         ):
             reads = ", ".join("read()" for _ in range(element.size))
             lines.append(f"const {_cpp_type(name)} a{position}{{{reads}}};")
-        arguments = ", ".join(f"a{i}" for i in range(len(kernel["operands"])))
+        names = [f"a{i}" for i in range(len(kernel["operands"]))]
+        if first := kernel.get("first"):
+            names[0] = f"{first}({names[0]})"
+        arguments = ", ".join(names)
         space = f"{kernel['namespace']}::" if kernel["namespace"] else ""
         lines.append(f"write({space}{kernel['name']}({arguments}));")
         cases.append(f"    case {number}: {{ {' '.join(lines)} break; }}")
@@ -504,7 +523,9 @@ def test_no_kernel_is_without_a_definition(algebra: str) -> None:
     known = {"exp", "log", "cayley", "cayley_inverse", "normalize", "norm", "inverse", "sqrt"}
     known |= {"dexp", "dexp_inverse"}
     for kernel in library.kernels:
-        if kernel["polynomial"]:
+        if kernel["name"].endswith("_matrix"):
+            assert any(kernel["name"] == k.get("first") for k in library.polynomial)
+        elif kernel["polynomial"]:
             assert callable(library.definition(kernel))
         else:
             assert kernel["name"].removesuffix("_lean") in known, (

@@ -53,6 +53,7 @@ PRODUCTS = (
     "anticommutator",
     "project",
     "sandwich",
+    "transform",
     "norm_squared",
     "ad",
     "coadjoint",
@@ -62,6 +63,12 @@ PRODUCTS = (
     "pairing",
 )
 """Polynomial kernels with sums in them; the others only move or change signs of numbers."""
+
+
+def is_product(name: str) -> bool:
+    """Whether a kernel of that name is one of these, or gives a versor's matrix."""
+    return name in PRODUCTS or name.endswith("_matrix")
+
 
 DEFINED = ("exp", "log", "sqrt", "cayley_inverse", "cayley", "inverse", "norm", "normalize")
 """Functions with an equation to hold the reference against; a variant is called NAME_VARIANT."""
@@ -89,7 +96,7 @@ def kernels(algebra: str) -> tuple[Kernel, ...]:
     return tuple(
         k
         for k in _library(algebra)
-        if k.name in PRODUCTS or (k.meaning is None and len(k.operands) == 1)
+        if is_product(k.name) or (k.meaning is None and len(k.operands) == 1)
     )
 
 
@@ -128,7 +135,7 @@ def _weights(algebra: str, element: Element) -> list[int]:
         partner = next((j for j, x in enumerate(row) if x and j != i), i)
         of_vector.append(0 if row[i] else -1 if partner > i else 1)
     return [
-        sum(w for i, w in enumerate(of_vector) if next(iter(c.embedding)) >> i & 1)
+        sum(w for i, w in enumerate(of_vector) if next(iter(c.embedding), 0) >> i & 1)
         for c in element.components
     ]
 
@@ -565,7 +572,7 @@ def table(found: Sequence[KernelMeasurement], before: str = "") -> str:
         r"^\| `(\w+)`(?: ‡)? \| (\w+) \| (.*) \|$", before, re.MULTILINE
     ):
         if algebra not in measured:
-            rows[name in PRODUCTS][name, algebra] = cells
+            rows[is_product(name)][name, algebra] = cells
     blocks = []
     for polynomial, of_kind in rows.items():
         second = "by component" if polynomial else "of the norm"

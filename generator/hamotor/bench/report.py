@@ -9,16 +9,16 @@ from typing import Any
 from hamotor.files import whole
 
 BASELINE = "Eigen"
-CONVERTED = "Eigen Isometry3, converted"
 MODES = ("latency", "array of 256", "array of 4096")
 _BLUE, _SKY, _GREY = "#0072B2", "#56B4E9", "#8a8a8a"
 _ORANGE, _VERMILLION, _GREEN, _PURPLE = "#E69F00", "#D55E00", "#009E73", "#CC79A7"
 _COLOURS = {
     "generated": _BLUE,
     "generated, lean": "#4f9bd9",
+    "generated, converted": "#9cc7ea",
     "Eigen quaternion + translation": _ORANGE,
     "Eigen Isometry3": _VERMILLION,
-    CONVERTED: "#f0b08a",
+    "Eigen Isometry3, converted": "#f0b08a",
     "Eigen 4x4 matrix": _PURPLE,
     "Eigen 5x5 matrix": _VERMILLION,
     "Eigen 4x4 complex": _PURPLE,
@@ -51,7 +51,7 @@ def table(account: Mapping[str, Any]) -> str:
     said = account["provenance"]
     lines += [
         f"ns: {account['unit']}; x: ratio to the best Eigen over all compilers (< 1 is faster)",
-        f"Eigen's matrices are given as such; {CONVERTED} is made of quaternion and translation",
+        "matrix given: made before, once; converted: made anew by each operation",
         f"error: {account['error']}",
         f"{said['processor']}; {'; '.join(said['compilers'].values())}; {said['flags']}",
     ]

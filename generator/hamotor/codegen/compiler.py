@@ -62,7 +62,7 @@ def library_files(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> tuple[SourceF
     """The files of a library whose kernels are these, before formatting."""
     folder = f"hamotor/{spec.name}"
     algebra_kernels = [k for k in kernels if not k.namespace]
-    basic = [e for e in spec.elements.values() if e.name != "Scalar"] + _defects(kernels)
+    basic = [e for e in spec.elements.values() if e.name != "Scalar"] + _unlisted(spec, kernels)
     files = [
         _elements_file(spec, folder, basic),
         _kernels_file(spec, folder, "kernels", "", algebra_kernels, [f"{folder}/elements.hpp"]),
@@ -87,10 +87,10 @@ def library_files(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> tuple[SourceF
     return tuple(files)
 
 
-def _defects(kernels: Sequence[Kernel]) -> list[Element]:
-    """The types of M ~M − 1, which no spec lists."""
-    results = [k.program.result for k in kernels if k.name == "unit_defect"]
-    return [element for element in results if element is not None]
+def _unlisted(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> list[Element]:
+    """The types that no spec lists: of M ~M − 1 and of matrices."""
+    results = {k.program.result.name: k.program.result for k in kernels if k.program.result}
+    return [e for n, e in results.items() if n not in spec.elements and not e.namespace]
 
 
 @cache
@@ -166,7 +166,7 @@ def _element_data(algebra: Algebra, element: Element) -> dict[str, Any]:
         "casts": ", ".join(f"static_cast<T>({n})" for n in names),
         "is_versor": element.unit and bool(scalar),
         "identity": "{" + identity + "}",
-        "is_linear": bool(names) and not element.fixed,
+        "is_linear": bool(element.blades) and not element.fixed,
         "sums": ", ".join(f"a.{n} + b.{n}" for n in names),
         "differences": ", ".join(f"a.{n} - b.{n}" for n in names),
         "negatives": ", ".join(f"-a.{n}" for n in names),
@@ -315,7 +315,7 @@ def _index(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
         "spec_sha256": spec.digest,
         "elements": [
             _element_index(spec.algebra, e)
-            for e in [*spec.elements.values(), *_defects(kernels)]
+            for e in [*spec.elements.values(), *_unlisted(spec, kernels)]
             + [x for g in spec.groups for x in (g.rate, g.momentum)]
         ],
         "kernels": [

@@ -158,7 +158,7 @@ def _operand_scaled(
     sizes = {magnitude(poly.content(p)) for p in meaning.values() if p}
     if len(sizes) != 1 or sizes == {1} or not _is_power_of_two(size := sizes.pop()):
         return None
-    names, bindings = _multiples(value_of(operand), size)
+    names, bindings = multiples(value_of(operand), size)
     if not all(any(x in names for x in m) for p in meaning.values() for m in p):
         return None
     values: dict[str, Polynomial] = {x: {(y,): ratio(1, size)} for x, y in names.items()}
@@ -171,7 +171,7 @@ def _is_power_of_two(x: Rational) -> bool:
     return x > 0 and all(n & (n - 1) == 0 for n in (x.numerator, x.denominator))
 
 
-def _multiples(
+def multiples(
     value: PolynomialMultivector, factor: Rational
 ) -> tuple[dict[str, str], tuple[tuple[str, Expression], ...]]:
     """Names for the multiples of a value's components, by component, and what binds them."""
@@ -438,7 +438,7 @@ def _twice(
     translating = _translating(algebra, versor)
     if not doubled:
         return versor, Staging(translating)
-    names, bindings = _multiples(versor, 2)
+    names, bindings = multiples(versor, 2)
     staging = Staging(translating | {names[x] for x in translating})
     staging.bindings += bindings
     values: dict[str, Polynomial] = {x: {(y,): Fraction(1, 2)} for x, y in names.items()}

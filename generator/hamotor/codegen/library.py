@@ -32,6 +32,7 @@ from hamotor.codegen.kernel import (
     sandwich_kernel,
     value_of,
 )
+from hamotor.codegen.matrix import matrix_kernels
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
 from hamotor.codegen.program import Call, Parameter
 from hamotor.codegen.spec import AlgebraSpec, Request
@@ -77,7 +78,7 @@ def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multi
 
 def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
     """Every kernel of a spec, in the order of its requests and then of its groups."""
-    kernels = [request_kernel(spec, request) for request in stepping_requests(spec)]
+    kernels = [k for request in stepping_requests(spec) for k in request_kernels(spec, request)]
     for kernel in kernels:
         _check_symbols(spec, kernel)
     for element in {group.element.name: group.element for group in spec.groups}.values():
@@ -177,8 +178,25 @@ def smallest_element(spec: AlgebraSpec, value: Mapping[Blade, object], where: st
     return min(candidates, key=lambda e: len(e.components))
 
 
+def request_kernels(spec: AlgebraSpec, request: Request) -> tuple[Kernel, ...]:
+    """What a request asks for: a kernel; of `matrix` also its application to an element."""
+    if request.operation != "matrix":
+        return (request_kernel(spec, request),)
+    where = f"{spec.file}: {request}"
+    versor, operand, result, _ = _moving(spec, request, where)
+    kernels = matrix_kernels(spec.algebra, versor, operand, result)
+    matrix = kernels[0].program.result
+    if matrix is not None and matrix.name in spec.elements:
+        raise UsageError(
+            f"{where}: {matrix.name} is an element type already, and what the matrix is called"
+        )
+    return kernels
+
+
 def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
-    """The kernel that a request asks for."""
+    """The kernel that a request asks for, the first if there are two."""
+    if request.operation == "matrix":
+        return request_kernels(spec, request)[0]
     where = f"{spec.file}: {request}"
     algebra = spec.algebra
     operands = [spec.element(name, where) for name in request.operands]
@@ -200,23 +218,7 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
         _keep_promise(algebra, value, result, where, unit=unit)
         return product_kernel(algebra, name, LAWS[name], product, left, right, result)
     if request.operation == "sandwich":
-        versor, operand = operands
-        if not versor.unit or len({g % 2 for g in versor.grades}) != 1:
-            raise UsageError(
-                f"{where}: {versor.name} must be a unit versor (unit = true), even or odd"
-            )
-        odd = any(g % 2 for g in versor.grades)
-        if odd and len(operand.grades) != 1:
-            raise UsageError(f"{where}: {operand.name} must be of one grade for an odd versor")
-        if odd and operand.fixed:
-            raise UsageError(
-                f"{where}: {operand.name} has a fixed part, whose sign a reflection may change; "
-                "name the type of any weight"
-            )
-        law = "(−1)^k m x ~m, x of grade k: reflects x in m" if odd else "m x ~m: moves x by m"
-        target = result or operand
-        moved = moved_value(algebra, versor, operand)
-        _keep_promise(algebra, moved, target, where, unit=operand.unit)
+        versor, operand, target, law = _moving(spec, request, where)
         return sandwich_kernel(algebra, "sandwich", law, versor, operand, target)
     if request.operation == "project":
         return _project(spec, operands, result, where)
@@ -228,6 +230,28 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
     if given is not None and (given.fixed or given.unit):
         _keep_unary_promise(request.operation, operands[0], given, where)
     return kernel
+
+
+def _moving(
+    spec: AlgebraSpec, request: Request, where: str
+) -> tuple[Element, Element, Element, str]:
+    """Versor, operand and result of a sandwich, and its law; UsageError where it has none."""
+    versor, operand = (spec.element(name, where) for name in request.operands)
+    if not versor.unit or len({g % 2 for g in versor.grades}) != 1:
+        raise UsageError(f"{where}: {versor.name} must be a unit versor (unit = true), even or odd")
+    odd = any(g % 2 for g in versor.grades)
+    if odd and len(operand.grades) != 1:
+        raise UsageError(f"{where}: {operand.name} must be of one grade for an odd versor")
+    if odd and operand.fixed:
+        raise UsageError(
+            f"{where}: {operand.name} has a fixed part, whose sign a reflection may change; "
+            "name the type of any weight"
+        )
+    law = "(−1)^k m x ~m, x of grade k: reflects x in m" if odd else "m x ~m: moves x by m"
+    target = spec.element(request.result, where) if request.result else operand
+    moved = moved_value(spec.algebra, versor, operand)
+    _keep_promise(spec.algebra, moved, target, where, unit=operand.unit)
+    return versor, operand, target, law
 
 
 def _chain(

@@ -117,6 +117,8 @@ def _split(operands: Sequence[str], where: str) -> tuple[list[str], int | None, 
 
 def _operation(kernel: Kernel) -> str:
     """The operation of a spec that a kernel answers: `grade_2` answers `grade`."""
+    if kernel.name.endswith("_matrix"):
+        return "matrix"
     return "grade" if kernel.name.startswith("grade_") else kernel.name
 
 

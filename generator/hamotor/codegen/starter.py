@@ -20,6 +20,7 @@ PRODUCTS = (
     "commutator",
     "anticommutator",
     "sandwich",
+    "matrix",
     "project",
     "reverse",
     "involute",
@@ -226,6 +227,7 @@ def _kernels(
         "commutator": [f"{name[j]} {name[2]} -> {name[j]}" for j in inner_grades if n > 2],
         "anticommutator": [f"{name[1]} {name[1]} -> Scalar"] if n > 1 else [],
         "sandwich": [f"Versor {name[j]}" for j in inner_grades if n < 6 or j == 1],
+        "matrix": [f"Versor {name[1]}"] if n < 6 else [],
         "reverse": (["Versor"] if has_versor else []) + ["Even", "Odd"],
         "grade": [f"Even {g}" for g in range(0, n + 1, 2)]
         + [f"Odd {g}" for g in range(1, n + 1, 2)],
