@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import partial
+from functools import cache
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import (
@@ -347,21 +347,36 @@ def sandwich_kernel(
     odd = any(g % 2 for g in versor.grades)
     overall = -1 if odd and operand.grades[0] % 2 else 1
     kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
-    makers: list[Callable[[bool], SandwichForm | None]] = [
-        partial(_commutator_first, algebra, (v, x), kind, sign)
-        for kind, sign in (kinds if odd else kinds[:1])
-    ]
-    first = _commutator_first(algebra, (v, x), *kinds[0], doubled=False)
-    last = None if odd else _commutator_last(algebra, (v, x), doubled=False)
-    if last is not None and _no_larger_terms(last, first, result):
-        makers.append(partial(_commutator_last, algebra, (v, x)))
-    kernels = [
-        _sandwich(algebra, name, law, (v, x), result, namespace, overall, form)
-        for doubled in (True, False)
-        for make in makers
-        if (form := make(doubled)) is not None
-    ]
-    return min(kernels, key=lambda kernel: kernel.program.cost.total)
+    forms: list[tuple[Program, SandwichForm, bool]] = []
+    for doubled in (True, False):
+        for kind, sign in kinds if odd else kinds[:1]:
+            form = _commutator_first(algebra, (v, x), kind, sign, doubled)
+            forms.append((_sandwich_program((v, x), result, overall, form), form, True))
+        last = None if odd else _commutator_last(algebra, (v, x), doubled)
+        if last is not None:
+            forms.append((_sandwich_program((v, x), result, overall, last), last, False))
+
+    @cache
+    def bounded() -> bool:
+        first = _commutator_first(algebra, (v, x), *kinds[0], doubled=False)
+        last = _commutator_last(algebra, (v, x), doubled=False)
+        return last is not None and _no_larger_terms(last, first, result)
+
+    forms.sort(key=lambda one: one[0].cost.total)
+    program, form, _ = next(one for one in forms if one[2] or bounded())
+    both = poly.apply_bilinear(
+        algebra.geometric,
+        poly.apply_bilinear(algebra.geometric, value_of(v), value_of(x)),
+        reversed_value(value_of(v)),
+    )
+    defect = poly.added({0: ONE}, form.unit, -1)
+    rest_of_unit = poly.apply_bilinear(algebra.geometric, value_of(x), defect)
+    meaning = {
+        n: poly.scaled(p, overall)
+        for n, p in read_off(poly.added(both, rest_of_unit, form.sign), result).items()
+    }
+    notes = (f"Needs M ~M = 1: computed as {form.note}.",)
+    return proved(Kernel(name, law, program, meaning, namespace, None, notes))
 
 
 @dataclass(frozen=True)
@@ -441,8 +456,10 @@ def _twice(
     names, bindings = multiples(versor, 2)
     staging = Staging(translating | {names[x] for x in translating})
     staging.bindings += bindings
-    values: dict[str, Polynomial] = {x: {(y,): Fraction(1, 2)} for x, y in names.items()}
-    return {b: poly.scaled(poly.substituted(p, values), 2) for b, p in versor.items()}, staging
+    return {
+        b: {tuple(names[x] for x in m): c if m else 2 * c for m, c in p.items()}
+        for b, p in versor.items()
+    }, staging
 
 
 def _commutator_first(
@@ -495,19 +512,11 @@ def _commutator_last(
     return SandwichForm(form, 1, staging, 1 if doubled else 2, part, unit)
 
 
-def _sandwich(
-    algebra: Algebra,
-    name: str,
-    law: str,
-    parameters: tuple[Parameter, Parameter],
-    result: Element,
-    namespace: str,
-    overall: int,
-    form: SandwichForm,
-) -> Kernel:
-    versor, value = (value_of(p) for p in parameters)
+def _sandwich_program(
+    parameters: tuple[Parameter, Parameter], result: Element, overall: int, form: SandwichForm
+) -> Program:
     change = read_off(form.part, result)
-    still = read_off(value, result)
+    still = read_off(value_of(parameters[1]), result)
     outputs: list[tuple[str, Expression]] = []
     for component in result.components:
         kept = poly.scaled(still[component.name], overall * form.sign)
@@ -524,18 +533,4 @@ def _sandwich(
             total = Product(number(content), polynomial_expression(inner))
         outputs.append((component.name, total))
     bindings = tuple(form.staging.bindings)
-    program = Program(parameters, bindings, tuple(outputs), result).without_unused()
-
-    both = poly.apply_bilinear(
-        algebra.geometric,
-        poly.apply_bilinear(algebra.geometric, versor, value),
-        reversed_value(versor),
-    )
-    defect = poly.added({0: ONE}, form.unit, -1)
-    rest_of_unit = poly.apply_bilinear(algebra.geometric, value, defect)
-    meaning = {
-        n: poly.scaled(p, overall)
-        for n, p in read_off(poly.added(both, rest_of_unit, form.sign), result).items()
-    }
-    notes = (f"Needs M ~M = 1: computed as {form.note}.",)
-    return proved(Kernel(name, law, program, meaning, namespace, None, notes))
+    return Program(parameters, bindings, tuple(outputs), result).without_unused()

@@ -27,7 +27,10 @@ def add_term(into: Polynomial, monomial: Monomial, coefficient: Rational) -> Non
 def add_scaled(into: Polynomial, other: Mapping[Monomial, Rational], factor: Rational) -> None:
     """Add `factor * other` to `into`."""
     for monomial, coefficient in other.items():
-        add_term(into, monomial, factor * coefficient)
+        if total := into.get(monomial, 0) + factor * coefficient:
+            into[monomial] = total
+        else:
+            into.pop(monomial, None)
 
 
 def times(a: Mapping[Monomial, Rational], b: Mapping[Monomial, Rational]) -> Polynomial:
@@ -35,7 +38,11 @@ def times(a: Mapping[Monomial, Rational], b: Mapping[Monomial, Rational]) -> Pol
     result: Polynomial = {}
     for left, x in a.items():
         for right, y in b.items():
-            add_term(result, tuple(sorted((*left, *right))), x * y)
+            monomial = tuple(sorted(left + right))
+            if total := result.get(monomial, 0) + x * y:
+                result[monomial] = total
+            else:
+                del result[monomial]
     return result
 
 
@@ -58,18 +65,37 @@ def apply_bilinear(
     a: Mapping[Blade, Polynomial],
     b: Mapping[Blade, Polynomial],
 ) -> PolynomialMultivector:
-    """Extend a product of basis blades to multivectors with polynomial coefficients."""
+    """Extend a product of basis blades to multivectors with polynomial coefficients.
+
+    Denominators are multiplied out before: whole numbers take a tenth of the time of fractions.
+    """
     result: PolynomialMultivector = {}
-    for blade_a, x in a.items():
-        for blade_b, y in b.items():
+    size_a, whole_a = _whole(a)
+    size_b, whole_b = _whole(b)
+    for blade_a, x in whole_a.items():
+        for blade_b, y in whole_b.items():
             table = product(blade_a, blade_b)
             if not table:
                 continue
             xy = times(x, y)
             for blade, coefficient in table.items():
-                into = result.setdefault(blade, {})
-                add_scaled(into, xy, coefficient)
-    return {blade: p for blade, p in result.items() if p}
+                if blade in result:
+                    add_scaled(result[blade], xy, coefficient)
+                else:
+                    result[blade] = {m: coefficient * c for m, c in xy.items()}
+    size = size_a * size_b
+    if size == 1:
+        return {blade: p for blade, p in result.items() if p}
+    return {blade: scaled(p, Fraction(1, size)) for blade, p in result.items() if p}
+
+
+def _whole(a: Mapping[Blade, Polynomial]) -> tuple[int, PolynomialMultivector]:
+    """A number, and a multiplied by it, which has whole coefficients."""
+    size = lcm(*(c.denominator for p in a.values() for c in p.values()))
+    return size, {
+        blade: {m: c.numerator * (size // c.denominator) for m, c in p.items()}
+        for blade, p in a.items()
+    }
 
 
 def added(

@@ -31,7 +31,7 @@ ROOM = 40_000
 """Characters that are formatted at a time: several processes share a long file."""
 COMPONENT = re.compile(r"(?<=[(,] )-?[a-z]\w*\.\w+(?=[,)])|(?<=\()-?[a-z]\w*\.\w+(?=[,)])")
 """An argument such as `-a.e12`: four tokens, over which clang-format weighs as many line breaks."""
-LONG = 5_000
+LONG = 3_000
 """Characters of a statement from which on it is given a shorter look."""
 STAND_IN = re.compile(r"\$z+")
 
