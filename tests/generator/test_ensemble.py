@@ -468,7 +468,7 @@ def test_parameters_that_there_are_not_are_refused(text: str, message: str) -> N
 def test_what_cannot_have_drawn_parameters_is_refused(bounce: Simulation) -> None:
     with pytest.raises(UsageError, match=r"2.stiffness, 1.acceleration_z cannot be drawn: taylor"):
         run_ensemble(bounce, 3, method="taylor")
-    with pytest.raises(UsageError, match=r"unknown method .closed_form."):
+    with pytest.raises(UsageError, match=r"method .closed_form. is for free rigid bodies"):
         run_ensemble(bounce, 3, method="closed_form")
 
 

@@ -343,10 +343,12 @@ class SceneLibrary:
 def check_method(method: str, methods: Mapping[str, int]) -> None:
     """Raise UsageError unless the scene offers this method."""
     if method not in methods:
-        allowed = ", ".join(sorted(methods))
-        raise UsageError(
-            f'unknown method "{method}"; this scene offers {allowed}.{suggest(method, methods)}'
-        )
+        from hamotor.scene.methods import what_it_steps
+
+        allowed = f"this scene offers {', '.join(sorted(methods))}."
+        if steps := what_it_steps(method):
+            raise UsageError(f'method "{method}" is for {steps}; {allowed}')
+        raise UsageError(f'unknown method "{method}"; {allowed}{suggest(method, methods)}')
 
 
 class LiveEnsemble:

@@ -99,6 +99,17 @@ def methods_offered(form: Form) -> dict[str, int]:
     return {method.name: method.order for method in METHODS if method.forms & form}
 
 
+def what_it_steps(name: str) -> str:
+    """What a method is for that not every scene offers; empty for others."""
+    for method in METHODS:
+        if method.name == name and not method.forms & Form.GENERAL:
+            if method.forms & Form.PARTS:
+                return "kinetic energies in parts of known motion, and potentials of place"
+            bodies = "rigid bodies with generated kernels"
+            return f"{bodies}, in potentials" if method.forms & Form.SPLIT else f"free {bodies}"
+    return ""
+
+
 def order_in_words(order: int) -> str:
     """`order 4`, or `exact`."""
     return f"order {order}" if order else "exact"

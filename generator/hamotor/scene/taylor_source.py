@@ -28,7 +28,7 @@ def required(system: System, scene: str, *, by_name: bool) -> str:
 def refusal(scene: str, reason: str) -> UsageError:
     """Why a scene has no Taylor series."""
     return UsageError(
-        f'{scene}: method "taylor" needs a motion in analytic formulas, but {reason}; use rkmk54'
+        f'{scene}: method "taylor" needs a motion in analytic formulas, but {reason}; use rk54'
     )
 
 
