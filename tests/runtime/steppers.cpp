@@ -59,7 +59,7 @@ TEST(Order, of_two_bodies_in_the_plane) { expect_orders(sample::two_bodies_se2()
 template <class System>
 struct WithoutRates : System {
   constexpr explicit WithoutRates(const System& system) : System(system) {}
-  void rates_in() const = delete;
+  void in_rates() const = delete;
 };
 
 template <class System>

@@ -280,6 +280,13 @@ class Ensemble {
         };
         const bool small = (Method::turns_stay_small(systems[g], blocks[g].state, h) && ...);
         small ? take(std::true_type{}) : take(std::false_type{});
+      } else if constexpr (requires { typename Method::Plan; }) {
+        const std::array<typename Method::Plan, in_turn> plans{
+            typename Method::Plan(systems[g], h)...};
+        for (std::int64_t k = 0; k < steps; ++k) {
+          const Scalar t = now(index + k);
+          (blocks[g].method.do_step(plans[g], blocks[g].state, t), ...);
+        }
       } else {
         for (std::int64_t k = 0; k < steps; ++k) {
           const Scalar t = now(index + k);

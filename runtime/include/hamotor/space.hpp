@@ -100,6 +100,23 @@ template <class S, class... Rest>
   return less(-(a * b), rest...);
 }
 
+/// The products of components, and what they add to others; types of as many components.
+template <class T, class Other>
+[[nodiscard]] HAMOTOR_INLINE constexpr T each_times(const T& a, const Other& b) noexcept {
+  auto x = a.components();
+  const auto y = b.components();
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = x[k] * y[k];
+  return T::from(x);
+}
+template <class T, class A, class B>
+[[nodiscard]] HAMOTOR_INLINE constexpr T each_mul_add(const A& a, const B& b, const T& c) noexcept {
+  const auto x = a.components();
+  const auto y = b.components();
+  auto z = c.components();
+  for (std::size_t k = 0; k < z.size(); ++k) z[k] = mul_add(x[k], y[k], z[k]);
+  return T::from(z);
+}
+
 }  // namespace detail
 
 /// Geometry of the space on which G acts; specialised for each group.
@@ -131,23 +148,37 @@ struct Space<pga3::SE3> {
   [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::se3::Momentum<S> with_force(
       const pga3::se3::Momentum<S>& mu, const Factor& a, const pga3::Point<S>& x,
       const std::array<S, 3>& f) noexcept {
-    const S x1 = a * x.e032;
-    const S x2 = a * x.e013;
-    const S x3 = a * x.e021;
+    return with_lever(mu, a, scaled(a, x), f);
+  }
+  /// The same where a x is known.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::se3::Momentum<S> with_lever(
+      const pga3::se3::Momentum<S>& mu, const Factor& a, const pga3::Point<S>& lever,
+      const std::array<S, 3>& f) noexcept {
+    const auto& [x1, x2, x3] = lever;
     return {dot(mu.l23, x2, f[2], -x3, f[1]), dot(mu.l31, x3, f[0], -x1, f[2]),
             dot(mu.l12, x1, f[1], -x2, f[0]), mul_add(a, f[0], mu.p1),
             mul_add(a, f[1], mu.p2),          mul_add(a, f[2], mu.p3)};
   }
 
-  /// x − ~M o M of the origin o.
+  /// a x.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Point<S> scaled(
+      const Factor& a, const pga3::Point<S>& x) noexcept {
+    return {a * x.e032, a * x.e013, a * x.e021};
+  }
+
+  /// x − ~M o M of the origin o, in two parts: half of it.
+  static constexpr int origin_parts = 2;
   template <class S>
   [[nodiscard]] HAMOTOR_INLINE static constexpr std::array<S, 3> from_origin(
       const pga3::Point<S>& x, const pga3::Motor<S>& m) noexcept {
     using detail::less;
-    return {
-        mul_add(S(-2), less(dot(m.e01 * m.s, m.e03, m.e31, m.e0123, m.e23), m.e02, m.e12), x.e032),
-        mul_add(S(-2), less(dot(m.e02 * m.s, m.e01, m.e12, m.e0123, m.e31), m.e03, m.e23), x.e013),
-        mul_add(S(-2), less(dot(m.e03 * m.s, m.e02, m.e23, m.e0123, m.e12), m.e01, m.e31), x.e021)};
+    using detail::onto;
+    const S half(0.5);
+    return {less(onto(half * x.e032, m.e02, m.e12), m.e01, m.s, m.e03, m.e31, m.e0123, m.e23),
+            less(onto(half * x.e013, m.e03, m.e23), m.e02, m.s, m.e01, m.e12, m.e0123, m.e31),
+            less(onto(half * x.e021, m.e01, m.e31), m.e03, m.s, m.e02, m.e23, m.e0123, m.e12)};
   }
 
   /// `start` and 2 M B of a rate B.
@@ -185,6 +216,24 @@ struct Space<pga3::SE3> {
          dot(m.e03, half, m.e03, e0123, m.e12),
          less_product(e0123, m.s, mul_add(half, m.e0123, m.e0123))};
     return scalar::max_abs(defect, e0123 + e0123);
+  }
+
+  /// M becomes x M put back on the group, as good as without that factor; the same of x M.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga3::Motor<S>& m, const S& x) noexcept {
+    const S square = dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
+    const S e0123 = detail::less(m.e0123 * m.s, m.e01, m.e23, m.e02, m.e31, m.e03, m.e12);
+    const S by = mul_add(S(-0.5) * x * x * x, square, S(1.5) * x);
+    const S across = x * x * x * e0123;
+    m = {by * m.s,
+         by * m.e23,
+         by * m.e31,
+         by * m.e12,
+         mul_add(by, m.e01, across * m.e23),
+         mul_add(by, m.e02, across * m.e31),
+         mul_add(by, m.e03, across * m.e12),
+         less_product(across, m.s, by * m.e0123)};
+    return scalar::max_abs(mul_add(x * x, square, S(-1)), S(2) * x * x * e0123);
   }
 
   /// M T − M for the translation T by d, in the body frame.
@@ -228,11 +277,23 @@ struct Space<pga3::SO3> {
   [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::so3::Momentum<S> with_force(
       const pga3::so3::Momentum<S>& mu, const Factor& a, const pga3::Point<S>& x,
       const std::array<S, 3>& f) noexcept {
-    const S x1 = a * x.e032;
-    const S x2 = a * x.e013;
-    const S x3 = a * x.e021;
+    return with_lever(mu, a, scaled(a, x), f);
+  }
+  /// The same where a x is known.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::so3::Momentum<S> with_lever(
+      const pga3::so3::Momentum<S>& mu, const Factor&, const pga3::Point<S>& lever,
+      const std::array<S, 3>& f) noexcept {
+    const auto& [x1, x2, x3] = lever;
     return {dot(mu.l23, x2, f[2], -x3, f[1]), dot(mu.l31, x3, f[0], -x1, f[2]),
             dot(mu.l12, x1, f[1], -x2, f[0])};
+  }
+
+  /// a x.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Point<S> scaled(
+      const Factor& a, const pga3::Point<S>& x) noexcept {
+    return {a * x.e032, a * x.e013, a * x.e021};
   }
 
   /// `start` and 2 M B of a rate B.
@@ -254,6 +315,14 @@ struct Space<pga3::SO3> {
     const S half = S(-0.5) * defect;
     m = mul_add(half, m, m);
     return scalar::abs(defect);
+  }
+
+  /// M becomes x M put back on the group; |x² M ~M − 1|.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga3::Rotor<S>& m, const S& x) noexcept {
+    const S square = dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
+    m = mul_add(S(-0.5) * x * x * x, square, S(1.5) * x) * m;
+    return scalar::abs(mul_add(x * x, square, S(-1)));
   }
 
   /// M q − M.
@@ -288,11 +357,26 @@ struct Space<pga2::SE2> {
   [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::se2::Momentum<S> with_force(
       const pga2::se2::Momentum<S>& mu, const Factor& a, const pga2::Point<S>& x,
       const std::array<S, 2>& f) noexcept {
-    return {dot(mu.l12, a * x.e20, f[1], a * -x.e01, f[0]), mul_add(a, f[0], mu.p1),
+    return with_lever(mu, a, scaled(a, x), f);
+  }
+  /// The same where a x is known.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::se2::Momentum<S> with_lever(
+      const pga2::se2::Momentum<S>& mu, const Factor& a, const pga2::Point<S>& lever,
+      const std::array<S, 2>& f) noexcept {
+    return {dot(mu.l12, lever.e20, f[1], -lever.e01, f[0]), mul_add(a, f[0], mu.p1),
             mul_add(a, f[1], mu.p2)};
   }
 
+  /// a x.
+  template <class S, class Factor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::Point<S> scaled(
+      const Factor& a, const pga2::Point<S>& x) noexcept {
+    return {a * x.e20, a * x.e01};
+  }
+
   /// x − ~M o M of the origin o.
+  static constexpr int origin_parts = 1;
   template <class S>
   [[nodiscard]] static constexpr std::array<S, 2> from_origin(const pga2::Point<S>& x,
                                                               const pga2::Motor<S>& m) noexcept {
@@ -318,6 +402,14 @@ struct Space<pga2::SE2> {
     const S half = S(-0.5) * defect;
     m = mul_add(half, m, m);
     return scalar::abs(defect);
+  }
+
+  /// M becomes x M put back on the group; |x² M ~M − 1|.
+  template <class S>
+  HAMOTOR_INLINE static constexpr S put_back(pga2::Motor<S>& m, const S& x) noexcept {
+    const S square = dot(m.s, m.s, m.e12, m.e12);
+    m = mul_add(S(-0.5) * x * x * x, square, S(1.5) * x) * m;
+    return scalar::abs(mul_add(x * x, square, S(-1)));
   }
 
   /// M T − M for the translation T by d, in the body frame.

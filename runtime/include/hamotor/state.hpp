@@ -123,10 +123,10 @@ concept PoweredSystem = GeneralSystem<System> && requires(const System& system) 
 };
 
 /// A system whose momenta are constant multiples of its rates, so that these can be stepped in
-/// their place, with any time as unit:
-/// - `rates_in(unit, momenta)`: unit B;
-/// - `slopes_in(start, unit, motors, rates)`: unit² μ̇ at these rates, each component of it in a
-///   unit of the system's own, added to the components `start(i)` of body i;
+/// their place, with any time as unit: `in_rates(unit)` has
+/// - `rates(momenta)`: unit B;
+/// - `slopes(start, motors, rates)`: unit² μ̇ at these rates, each component of it in a unit of the
+///   system's own, added to the components `start(i)` of body i;
 /// - `rate_weights()`: what slopes are to be multiplied by for unit² Ḃ;
 /// - `momentum_weights(x)`: and for x unit² μ̇.
 template <class System>
@@ -137,10 +137,12 @@ concept RateSystem =
         const typename System::Rates& rates, const typename System::Momenta& momenta,
         const typename System::Scalar& unit,
         decltype(std::declval<typename System::Momenta>()[0].components()) (*start)(std::size_t)) {
-      { system.rates_in(unit, momenta) } -> std::same_as<typename System::Rates>;
-      { system.slopes_in(start, unit, motors, rates) } -> std::same_as<typename System::Momenta>;
-      { system.rate_weights() } -> std::same_as<typename System::Rates>;
-      { system.momentum_weights(unit) } -> std::same_as<typename System::Momenta>;
+      { system.in_rates(unit).rates(momenta) } -> std::same_as<typename System::Rates>;
+      {
+        system.in_rates(unit).slopes(start, motors, rates)
+      } -> std::same_as<typename System::Momenta>;
+      { system.in_rates(unit).rate_weights() } -> std::convertible_to<typename System::Rates>;
+      { system.in_rates(unit).momentum_weights(unit) } -> std::same_as<typename System::Momenta>;
     };
 
 /// The state space of a system.

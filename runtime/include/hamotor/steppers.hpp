@@ -29,23 +29,6 @@ template <class Rate, class S>
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
 }
 
-/// The products of components, and what they add to others.
-template <class T>
-[[nodiscard]] HAMOTOR_INLINE constexpr T each_times(const T& a, const T& b) noexcept {
-  auto x = a.components();
-  const auto y = b.components();
-  for (std::size_t k = 0; k < x.size(); ++k) x[k] = x[k] * y[k];
-  return T::from(x);
-}
-template <class T, class A, class B>
-[[nodiscard]] HAMOTOR_INLINE constexpr T each_mul_add(const A& a, const B& b, const T& c) noexcept {
-  const auto x = a.components();
-  const auto y = b.components();
-  auto z = c.components();
-  for (std::size_t k = 0; k < z.size(); ++k) z[k] = mul_add(x[k], y[k], z[k]);
-  return T::from(z);
-}
-
 /// Whether spins commute with everything else in a system and are left to the end of a step.
 template <class System>
 inline constexpr bool has_spin_apart = false;
@@ -207,6 +190,19 @@ class ExplicitMethod {
         });
   }
 
+  /// Motors become `by` times `motors`; momenta gain each component by a factor of its own.
+  constexpr void settle(StateOf<System>& state, const S& by, const Motors& motors,
+                        const Momenta& factors, const Momenta& forces) noexcept
+    requires(!compensated)
+  {
+    move(
+        state, factors, forces, S(0), [](std::size_t) { return Motor{}; },
+        [&](std::size_t i, Motor& motor) {
+          motor = motors[i];
+          return Space<G>::put_back(motor, by);
+        });
+  }
+
   /// Six times the mean of a step of the classical method.
   template <class T>
   [[nodiscard]] static constexpr T mean(const T& one, const T& two, const T& three,
@@ -326,6 +322,21 @@ class Rkmk4 : public detail::ExplicitMethod<System, summation> {
 
 namespace detail {
 
+/// Adds the slope of a stage, of the first three, to those before it.
+template <std::size_t number, class Slope>
+HAMOTOR_INLINE constexpr void add_slope(Slope& sum, const Slope& slope) noexcept {
+  using S = std::remove_cvref_t<decltype(slope.motors[0].components()[0])>;
+  if constexpr (number == 0) {
+    sum = slope;
+  } else {
+    for (std::size_t i = 0; i < slope.motors.size(); ++i) {
+      sum.motors[i] = mul_add(S(2), slope.motors[i], sum.motors[i]);
+      sum.momenta[i] = mul_add(S(2), slope.momenta[i], sum.momenta[i]);
+    }
+    if constexpr (requires { slope.power; }) sum.power = mul_add(S(2), slope.power, sum.power);
+  }
+}
+
 /// What `Rk4` takes through its stages: M and μ, of any system.
 template <HamiltonianSystem System>
 class MomentumStages {
@@ -335,25 +346,48 @@ class MomentumStages {
  public:
   using Place = StateOf<System>;
   /// Ṁ, μ̇ and dH/dt.
-  struct Slope {
+  struct Sum {
     decltype(Place::motors) motors;
     decltype(Place::momenta) momenta;
     S power{};
   };
 
-  constexpr MomentumStages(const System& system, const S& t, const S& h) noexcept
-      : system_(system), time_(t), half_step_(S(0.5) * h) {}
+  constexpr MomentumStages(const System& system, const S& h) noexcept
+      : system_(system), half_step_(S(0.5) * h) {}
 
   [[nodiscard]] HAMOTOR_INLINE constexpr Place start(const StateOf<System>& state) const noexcept {
     return state;
   }
 
-  /// After so many half steps.
-  [[nodiscard]] HAMOTOR_INLINE constexpr Slope slope(const Place& there,
-                                                     int halves) const noexcept {
-    const S t = mul_add(S(halves), half_step_, time_);
+  /// From the stage of this number of a step from t, whose slope joins the sum, to the next one's
+  /// place.
+  template <std::size_t number>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place next(const S& t, const Place& start,
+                                                    const Place& here, Sum& sum) const noexcept {
+    const Sum along = slope(number == 0 ? t : t + half_step_, here);
+    add_slope<number>(sum, along);
+    const S by = S(number == 2 ? 2 : 1) * half_step_;
+    Place there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there.motors[i] = mul_add(by, along.motors[i], start.motors[i]);
+      there.momenta[i] = mul_add(by, along.momenta[i], start.momenta[i]);
+    }
+    return there;
+  }
+
+  HAMOTOR_INLINE constexpr void add_last(const S& t, const Place& here, Sum& sum) const noexcept {
+    const Sum last = slope(mul_add(S(2), half_step_, t), here);
+    for (std::size_t i = 0; i < n; ++i) {
+      sum.motors[i] = sum.motors[i] + last.motors[i];
+      sum.momenta[i] = sum.momenta[i] + last.momenta[i];
+    }
+    if constexpr (PoweredSystem<System>) sum.power = sum.power + last.power;
+  }
+
+ private:
+  [[nodiscard]] HAMOTOR_INLINE constexpr Sum slope(const S& t, const Place& there) const noexcept {
     const auto now = gradient(system_, there, t);
-    Slope result{};
+    Sum result{};
     result.momenta = free_momentum_rates(system_, there.momenta, now.rates);
     for (std::size_t i = 0; i < n; ++i) {
       result.motors[i] = kinematics(there.motors[i], now.rates[i]);
@@ -363,102 +397,123 @@ class MomentumStages {
     return result;
   }
 
-  HAMOTOR_INLINE constexpr void add_last(Slope& sum, const Place& there,
-                                         int halves) const noexcept {
-    const Slope last = slope(there, halves);
-    for (std::size_t i = 0; i < n; ++i) {
-      sum.motors[i] = sum.motors[i] + last.motors[i];
-      sum.momenta[i] = sum.momenta[i] + last.momenta[i];
-    }
-    if constexpr (PoweredSystem<System>) sum.power = sum.power + last.power;
-  }
-
-  [[nodiscard]] HAMOTOR_INLINE constexpr Place moved(const Place& from, int halves,
-                                                     const Slope& along) const noexcept {
-    const S by = S(halves) * half_step_;
-    Place there{};
-    for (std::size_t i = 0; i < n; ++i) {
-      there.motors[i] = mul_add(by, along.motors[i], from.motors[i]);
-      there.momenta[i] = mul_add(by, along.momenta[i], from.momenta[i]);
-    }
-    return there;
-  }
-
- private:
   const System& system_;
-  S time_;
   S half_step_;
 };
 
 /// The same with rates B = ∂H/∂μ in place of momenta, which are constant multiples of them, and
 /// h/4 as unit of time: nothing is then multiplied by J or h at every stage.
-template <RateSystem System>
+///
+/// In plain sums a motor's slope is nowhere by itself: M₂ = M + h/2 Ṁ₁, M₃ and M₄ are one sum each,
+/// and the step ends at (M₂ − M + h/2 Ṁ₄ + 2 M₃ + M₄)/3.
+template <RateSystem System, Summation summation>
 class RateStages {
   using S = typename System::Scalar;
   using Space = hamotor::Space<typename System::Group>;
   static constexpr std::size_t n = System::bodies;
 
  public:
+  /// Whether the sum is of places, three times the step's end.
+  static constexpr bool sums_places = summation == Summation::plain;
+
   struct Place {
     typename System::Motors motors;
     typename System::Rates rates;  ///< h B/4
   };
   /// h Ṁ/2, and μ̇ in units of the system's.
-  struct Slope {
+  struct Slopes {
     typename System::Motors motors;
     typename System::Momenta momenta;
   };
+  /// Of places the last two apart: what is small is summed first.
+  struct Places : Slopes {
+    typename System::Motors later;
+  };
+  using Sum = std::conditional_t<sums_places, Places, Slopes>;
 
-  constexpr RateStages(const System& system, const S& /*t*/, const S& h) noexcept
-      : system_(system), unit_(S(0.25) * h) {}
+  constexpr RateStages(const System& system, const S& h) noexcept
+      : form_(system.in_rates(S(0.25) * h)) {
+    const S whole = S(0.375) * h;
+    sixth_ = form_.momentum_weights(select(whole == S(0), S(0), S(1) / whole));
+    for (std::size_t i = 0; i < n; ++i) {
+      half_step_[i] = S(2) * form_.rate_weights()[i];
+      whole_step_[i] = S(4) * form_.rate_weights()[i];
+    }
+  }
 
   [[nodiscard]] HAMOTOR_INLINE constexpr Place start(const StateOf<System>& state) const noexcept {
-    return {state.motors, system_.rates_in(unit_, state.momenta)};
+    return {state.motors, form_.rates(state.momenta)};
   }
 
-  [[nodiscard]] HAMOTOR_INLINE constexpr Slope slope(const Place& there,
-                                                     int /*halves*/) const noexcept {
-    Slope result{};
-    const auto nothing = [](std::size_t) { return Nothing{}; };
-    result.momenta = system_.slopes_in(nothing, unit_, there.motors, there.rates);
-    for (std::size_t i = 0; i < n; ++i) {
-      result.motors[i] = Space::with_twice_velocity(Nothing{}, there.motors[i], there.rates[i]);
-    }
-    return result;
-  }
-
-  /// The last slope's terms are added to the sum one by one.
-  HAMOTOR_INLINE constexpr void add_last(Slope& sum, const Place& there,
-                                         int /*halves*/) const noexcept {
-    const auto start = [&](std::size_t i) { return sum.momenta[i].components(); };
-    sum.momenta = system_.slopes_in(start, unit_, there.motors, there.rates);
-    for (std::size_t i = 0; i < n; ++i) {
-      sum.motors[i] =
-          Space::with_twice_velocity(sum.motors[i].components(), there.motors[i], there.rates[i]);
-    }
-  }
-
-  [[nodiscard]] HAMOTOR_INLINE constexpr Place moved(const Place& from, int halves,
-                                                     const Slope& along) const noexcept {
-    const auto weights = system_.rate_weights();
+  /// From the stage of this number, whose slope joins the sum, to the next one's place.
+  template <std::size_t number>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Place next(const S& /*t*/, const Place& start,
+                                                    const Place& here, Sum& sum) const noexcept {
+    constexpr int halves = number == 2 ? 2 : 1;
     Place there{};
+    Slopes along{};
+    along.momenta = form_.slopes(nothing, here.motors, here.rates);
     for (std::size_t i = 0; i < n; ++i) {
-      there.motors[i] = halves == 1 ? from.motors[i] + along.motors[i]
-                                    : mul_add(S(halves), along.motors[i], from.motors[i]);
-      there.rates[i] = each_mul_add(S(2 * halves) * weights[i], along.momenta[i], from.rates[i]);
+      if constexpr (sums_places) {
+        const auto rate = halves == 2 ? here.rates[i] + here.rates[i] : here.rates[i];
+        there.motors[i] =
+            Space::with_twice_velocity(start.motors[i].components(), here.motors[i], rate);
+        along.motors[i] = there.motors[i];
+      } else {
+        along.motors[i] = Space::with_twice_velocity(Nothing{}, here.motors[i], here.rates[i]);
+        there.motors[i] = mul_add(S(halves), along.motors[i], start.motors[i]);
+      }
+    }
+    add<number>(sum, along, start);
+    const auto& weights = halves == 2 ? whole_step_ : half_step_;
+    for (std::size_t i = 0; i < n; ++i) {
+      there.rates[i] = each_mul_add(weights[i], along.momenta[i], start.rates[i]);
     }
     return there;
   }
 
-  /// What slopes are to be multiplied by for h μ̇/6.
-  [[nodiscard]] HAMOTOR_INLINE constexpr typename System::Momenta sixth() const noexcept {
-    const S whole = S(1.5) * unit_;
-    return system_.momentum_weights(select(whole == S(0), S(0), S(1) / whole));
+  /// The last slope's terms are added to the sum one by one.
+  HAMOTOR_INLINE constexpr void add_last(const S& /*t*/, const Place& here,
+                                         Sum& sum) const noexcept {
+    const auto start = [&](std::size_t i) { return sum.momenta[i].components(); };
+    sum.momenta = form_.slopes(start, here.motors, here.rates);
+    for (std::size_t i = 0; i < n; ++i) {
+      sum.motors[i] =
+          Space::with_twice_velocity(sum.motors[i].components(), here.motors[i], here.rates[i]);
+      if constexpr (sums_places) sum.motors[i] = sum.motors[i] + sum.later[i];
+    }
   }
 
+  /// What slopes are to be multiplied by for h μ̇/6.
+  [[nodiscard]] constexpr const typename System::Momenta& sixth() const noexcept { return sixth_; }
+
  private:
-  const System& system_;
-  S unit_;
+  static constexpr Nothing nothing(std::size_t /*body*/) noexcept { return {}; }
+
+  /// Adds what one of the first three stages found.
+  template <std::size_t number>
+  HAMOTOR_INLINE static constexpr void add(Sum& sum, const Slopes& along,
+                                           const Place& start) noexcept {
+    if constexpr (!sums_places) {
+      add_slope<number>(sum, along);
+    } else {
+      for (std::size_t i = 0; i < n; ++i) {
+        if constexpr (number == 0) {
+          sum.motors[i] = along.motors[i] - start.motors[i];
+          sum.momenta[i] = along.momenta[i];
+        } else {
+          sum.later[i] =
+              number == 1 ? along.motors[i] : mul_add(S(2), sum.later[i], along.motors[i]);
+          sum.momenta[i] = mul_add(S(2), along.momenta[i], sum.momenta[i]);
+        }
+      }
+    }
+  }
+
+  decltype(std::declval<const System&>().in_rates(S())) form_;
+  typename System::Rates half_step_;
+  typename System::Rates whole_step_;
+  typename System::Momenta sixth_;
 };
 
 }  // namespace detail
@@ -471,11 +526,10 @@ class RateStages {
 template <HamiltonianSystem System, Summation summation = Summation::plain>
 class Rk4 : public detail::ExplicitMethod<System, summation> {
   using Base = detail::ExplicitMethod<System, summation>;
-  using Base::n;
   using typename Base::S;
   static constexpr auto stages_of() noexcept {
     if constexpr (RateSystem<System>) {
-      return std::type_identity<detail::RateStages<System>>{};
+      return std::type_identity<detail::RateStages<System, summation>>{};
     } else {
       return std::type_identity<detail::MomentumStages<System>>{};
     }
@@ -486,67 +540,39 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   static constexpr int order = 4;
   static constexpr std::string_view name = "rk4";
 
-  /// A step under way: what its stages need of each other.
-  class Step {
+  /// What is the same in all steps of h; keeps a reference to the system.
+  class Plan {
    public:
-    static constexpr std::size_t stages = 4;
-
-    constexpr Step(const System& system, const StateOf<System>& state, const S& t,
-                   const S& h) noexcept
-        : stages_(system, t, h), start_(stages_.start(state)), here_(start_) {}
-
-    /// The next stage.
-    template <std::size_t number>
-    HAMOTOR_INLINE constexpr void take() noexcept {
-      if constexpr (number == 3) {
-        stages_.add_last(sum_, here_, 2);
-      } else {
-        const auto slope = stages_.slope(here_, number == 0 ? 0 : 1);
-        if constexpr (number == 0) {
-          sum_ = slope;
-        } else {
-          add_twice(slope);
-        }
-        here_ = stages_.moved(start_, number == 2 ? 2 : 1, slope);
-      }
-    }
+    constexpr Plan(const System& system, const S& h) noexcept : stages_(system, h), step_(h) {}
 
    private:
     friend Rk4;
-
-    HAMOTOR_INLINE constexpr void add_twice(const typename Stages::Slope& slope) noexcept {
-      for (std::size_t i = 0; i < n; ++i) {
-        sum_.motors[i] = mul_add(S(2), slope.motors[i], sum_.motors[i]);
-        sum_.momenta[i] = mul_add(S(2), slope.momenta[i], sum_.momenta[i]);
-      }
-      if constexpr (PoweredSystem<System>) sum_.power = mul_add(S(2), slope.power, sum_.power);
-    }
-
     Stages stages_;
-    typename Stages::Place start_;
-    typename Stages::Place here_;
-    typename Stages::Slope sum_{};
+    S step_;
   };
 
-  /// Takes `state` from t to t + h.  Flat: a slope that is called returns through memory.
-  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
-                                          const S& h) noexcept {
-    Step step(system, state, t, h);
-    step.template take<0>();
-    step.template take<1>();
-    step.template take<2>();
-    step.template take<3>();
-    finish(step, state, h);
+  /// Takes `state` from t to t + h.
+  constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                         const S& h) noexcept {
+    do_step(Plan(system, h), state, t);
   }
 
-  /// Moves `state`, which `step` began with, to its end.
-  HAMOTOR_INLINE constexpr void finish(const Step& step, StateOf<System>& state,
-                                       const S& h) noexcept {
-    const auto& sum = step.sum_;
-    if constexpr (RateSystem<System>) {
-      this->shift(state, S(1) / S(3), sum.motors, step.stages_.sixth(), sum.momenta);
+  /// The same by a plan for h.  Flat: a slope that is called returns through memory.
+  [[gnu::flatten]] constexpr void do_step(const Plan& plan, StateOf<System>& state,
+                                          const S& t) noexcept {
+    const Stages& stages = plan.stages_;
+    const auto start = stages.start(state);
+    typename Stages::Sum sum{};
+    const auto second = stages.template next<0>(t, start, start, sum);
+    const auto third = stages.template next<1>(t, start, second, sum);
+    const auto fourth = stages.template next<2>(t, start, third, sum);
+    stages.add_last(t, fourth, sum);
+    if constexpr (!RateSystem<System>) {
+      this->shift(state, plan.step_ / S(6), sum.motors, sum.momenta, sum.power);
+    } else if constexpr (Stages::sums_places) {
+      this->settle(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
     } else {
-      this->shift(state, h / S(6), sum.motors, sum.momenta, sum.power);
+      this->shift(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
     }
   }
 };

@@ -97,6 +97,28 @@ template <class Start, class S, class Factors>
   }
 }
 
+/// An interaction whose forques count by weights that are always the same.
+template <class Interaction, class Weights>
+struct Weighted {
+  const Interaction& interaction;
+  Weights weights;
+
+  template <class System, class Motors, class Momenta>
+  HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
+                                           Momenta& forque) const noexcept {
+    interaction.add_forque(system, motors, forque, weights);
+  }
+};
+template <class System, class Interaction, class Weights>
+[[nodiscard]] constexpr auto weighted(const System& system, const Interaction& interaction,
+                                      const Weights& weights) noexcept {
+  if constexpr (requires { interaction.weighted(system, weights); }) {
+    return interaction.weighted(system, weights);
+  } else {
+    return Weighted<Interaction, Weights>{interaction, weights};
+  }
+}
+
 /// What follows the first R numbers that sums begin with.
 template <std::size_t R>
 [[nodiscard]] HAMOTOR_INLINE constexpr Nothing rest(const Nothing& nothing) noexcept {
@@ -286,30 +308,30 @@ class FreeBody : public PrincipalBody<G, S, split> {
     }
   }
 
-  /// B in another unit of time, `unit` B.
-  [[nodiscard]] constexpr Rate rate_in(const S& unit, const Momentum& mu) const noexcept {
-    auto x = mu.components();
-    const auto& inverse = rotation_.inverse_moments();
-    for (std::size_t k = 0; k < rotations; ++k) x[k] = unit * inverse[k] * x[k];
-    for (std::size_t k = rotations; k < x.size(); ++k) x[k] = unit * inverse_mass_ * x[k];
-    return Rate::from(x);
+  /// What momenta are to be multiplied by for `unit` B.
+  [[nodiscard]] constexpr Rate rates_in(const S& unit) const noexcept {
+    return Rate::from(detail::joined(detail::scaled(unit, rotation_.inverse_moments()),
+                                     detail::filled<dimension>(unit * inverse_mass_)));
   }
 
-  /// `start` and [μ, B] in that unit and with the mass as unit of masses; where no forque is added
-  /// to it, the angular part with J_i − J_j as unit.
-  template <bool has_forque, class Start>
-  [[nodiscard]] constexpr Momentum slope(const Start& start, const Rate& rate) const noexcept {
+  /// `start` and unit² [μ, B] of `unit` B with the mass as unit of masses; where no forque is added
+  /// to it, the angular part with J_i − J_j as unit.  `factors`: of the angular part.
+  template <class Factors, class Start>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Momentum slope(const Factors& factors,
+                                                               const Start& start,
+                                                               const Rate& rate) noexcept {
     const auto x = rate.components();
     const auto turning = detail::first<rotations>(x);
-    const auto linear =
-        detail::turned_at(detail::rest<rotations>(start), detail::rest<rotations>(x), turning);
+    return Momentum::from(detail::joined(
+        detail::others_product(start, factors, turning),
+        detail::turned_at(detail::rest<rotations>(start), detail::rest<rotations>(x), turning)));
+  }
+  template <bool has_forque>
+  [[nodiscard]] constexpr auto slope_factors() const noexcept {
     if constexpr (has_forque) {
-      const auto factors = detail::scaled(inverse_mass_, rotation_.differences());
-      return Momentum::from(
-          detail::joined(detail::others_product(start, factors, turning), linear));
+      return detail::scaled(inverse_mass_, rotation_.differences());
     } else {
-      return Momentum::from(
-          detail::joined(detail::others_product(start, detail::Ones{}, turning), linear));
+      return detail::Ones{};
     }
   }
   /// What a forque counts for then.
@@ -343,8 +365,8 @@ class FreeBody : public PrincipalBody<G, S, split> {
     return sandwich(m, x);
   }
 
-  /// From a point of the world to one of the body, principal frame, m; from the world's origin in
-  /// two thirds of the operations.
+  /// From a point of the world to one of the body, principal frame, m, over `reach_parts`: from the
+  /// world's origin in half of the operations.
   [[nodiscard]] constexpr std::array<S, dimension> reach(const Element& m, const Point& from,
                                                          const Point& to) const noexcept {
     return detail::difference(to, sandwich(reverse(m), from));
@@ -353,6 +375,8 @@ class FreeBody : public PrincipalBody<G, S, split> {
                                                          const Point& to) const noexcept {
     return Space<G>::from_origin(to, m);
   }
+  template <class From>
+  static constexpr int reach_parts = std::is_same_v<From, Origin> ? Space<G>::origin_parts : 1;
 
   /// −m g·x, x the centre of mass; g in the world frame, m/s².
   [[nodiscard]] constexpr S weight_potential(const Element& m, const Direction& g) const noexcept {
@@ -413,22 +437,24 @@ class PivotedBody : public PrincipalBody<G, S, split> {
     return coadjoint(rate(mu), mu);
   }
 
-  /// B in another unit of time, `unit` B.
-  [[nodiscard]] constexpr Rate rate_in(const S& unit, const Momentum& mu) const noexcept {
-    auto x = mu.components();
-    const auto& inverse = rotation_.inverse_moments();
-    for (std::size_t k = 0; k < rotations; ++k) x[k] = unit * inverse[k] * x[k];
-    return Rate::from(x);
+  /// What momenta are to be multiplied by for `unit` B.
+  [[nodiscard]] constexpr Rate rates_in(const S& unit) const noexcept {
+    return Rate::from(detail::scaled(unit, rotation_.inverse_moments()));
   }
 
-  /// `start` and [μ, B] in that unit; where no forque is added to it, with J_i − J_j as unit.
-  template <bool has_forque, class Start>
-  [[nodiscard]] constexpr Momentum slope(const Start& start, const Rate& rate) const noexcept {
+  /// `start` and unit² [μ, B] of `unit` B; where no forque is added to it, with J_i − J_j as unit.
+  template <class Factors, class Start>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Momentum slope(const Factors& factors,
+                                                               const Start& start,
+                                                               const Rate& rate) noexcept {
+    return Momentum::from(detail::others_product(start, factors, rate.components()));
+  }
+  template <bool has_forque>
+  [[nodiscard]] constexpr auto slope_factors() const noexcept {
     if constexpr (has_forque) {
-      return Momentum::from(
-          detail::others_product(start, rotation_.differences(), rate.components()));
+      return rotation_.differences();
     } else {
-      return Momentum::from(detail::others_product(start, detail::Ones{}, rate.components()));
+      return detail::Ones{};
     }
   }
   /// What a forque counts for then.
@@ -478,6 +504,8 @@ class PivotedBody : public PrincipalBody<G, S, split> {
     for (std::size_t k = 0; k < dimension; ++k) y[k] = y[k] - pivot_[k];
     return detail::difference(to, sandwich(reverse(m), Point::from(y)));
   }
+  template <class From>
+  static constexpr int reach_parts = 1;
 
   /// −m g·x, x the centre of mass; g in the world frame, m/s².
   [[nodiscard]] constexpr S weight_potential(const Element& m, const Direction& g) const noexcept {
@@ -516,8 +544,8 @@ struct UniformGravity {
 
   /// Adds the body forques, each body's with a weight.
   template <class System, class Motors, class Momenta, class Weights>
-  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
-                            const Weights& weights) const noexcept {
+  HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
+                                           Momenta& forque, const Weights& weights) const noexcept {
     system.for_each_body([&](auto i, const auto& body) {
       forque[i] = body.with_weight_forque(forque[i], motors[i], acceleration, weights[i]);
     });
@@ -576,11 +604,48 @@ struct SpringToWorld {
   /// Adds the body forque with a weight: the line of k (1 − ℓ/r) times the extension, in the body
   /// frame.
   template <class System, class Motors, class Momenta, class Weights>
-  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
-                            const Weights& weights) const noexcept {
-    const auto extension = system.template body<index>().reach(motors[index], anchor, at);
-    const S pull = weights[index] * detail::tension<rest>(stiffness, rest_length, extension);
-    forque[index] = Space<G>::with_force(forque[index], pull, at, extension);
+  HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
+                                           Momenta& forque, const Weights& weights) const noexcept {
+    const auto reach = system.template body<index>().reach(motors[index], anchor, at);
+    const S pull = weights[index] * tension<System>(reach);
+    forque[index] = Space<G>::with_force(forque[index], pull, at, reach);
+  }
+
+  /// What does that for always the same weights, without what is then always the same.
+  template <class System, class Weights>
+  [[nodiscard]] constexpr auto weighted(const System& /*system*/,
+                                        const Weights& weights) const noexcept
+    requires(rest == RestLength::zero)
+  {
+    const S pull = weights[index] * tension<System>(std::array<S, Space<G>::dimension>{});
+    return Pull{*this, pull, Space<G>::scaled(pull, at)};
+  }
+
+ private:
+  struct Pull {
+    const SpringToWorld& spring;
+    S pull;
+    typename Space<G>::template Point<S> lever;
+
+    template <class System, class Motors, class Momenta>
+    HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
+                                             Momenta& forque) const noexcept {
+      const auto reach =
+          system.template body<index>().reach(motors[index], spring.anchor, spring.at);
+      forque[index] = Space<G>::with_lever(forque[index], pull, lever, reach);
+    }
+  };
+
+  /// The force over the reach.
+  template <class System>
+  [[nodiscard]] constexpr S tension(
+      const std::array<S, Space<G>::dimension>& reach) const noexcept {
+    constexpr int parts = System::template BodyAt<index>::template reach_parts<Anchor>;
+    if constexpr (parts == 1) {
+      return detail::tension<rest>(stiffness, rest_length, reach);
+    } else {
+      return S(parts) * detail::tension<rest>(stiffness, S(1.0 / parts) * rest_length, reach);
+    }
   }
 };
 
@@ -602,8 +667,8 @@ struct SpringBetween {
 
   /// Adds the two body forques, of one force and its opposite, each with a weight.
   template <class System, class Motors, class Momenta, class Weights>
-  constexpr void add_forque(const System& system, const Motors& motors, Momenta& forque,
-                            const Weights& weights) const noexcept {
+  HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
+                                           Momenta& forque, const Weights& weights) const noexcept {
     using Direction = typename Space<G>::template Direction<S>;
     const auto f = extension(system, motors);
     const S pull = detail::tension<rest>(stiffness, rest_length, f);
@@ -643,6 +708,12 @@ inline constexpr bool
 template <class Bodies, class Interactions = std::tuple<>>
 class RigidBodies;
 
+/// Their equations of motion with rates in place of momenta, and any time as unit: `unit` B, and
+/// unit² μ̇ with units for each component in which it takes the fewest operations.  What is the same
+/// in every step is found once.
+template <class System>
+class RateForm;
+
 template <class... Body, class... Interaction>
 class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   using FirstBody = std::tuple_element_t<0, std::tuple<Body...>>;
@@ -673,6 +744,10 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   constexpr explicit RigidBodies(const std::tuple<Body...>& all_bodies,
                                  const std::tuple<Interaction...>& interactions = {}) noexcept
       : bodies_(all_bodies), interactions_(interactions) {}
+
+  /// Type of body number `index`.
+  template <std::size_t index>
+  using BodyAt = std::tuple_element_t<index, std::tuple<Body...>>;
 
   /// Body number `index`.
   template <std::size_t index>
@@ -734,46 +809,9 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
     return result;
   }
 
-  /// B for every body in another unit of time, `unit` B.
-  [[nodiscard]] constexpr Rates rates_in(const Scalar& unit,
-                                         const Momenta& momenta) const noexcept {
-    Rates result{};
-    for_each_body([&](auto i, const auto& one) { result[i] = one.rate_in(unit, momenta[i]); });
-    return result;
-  }
-
-  /// unit² μ̇ for every body at these motors and `unit` B, each component in a unit of its own,
-  /// added to `start`: for every body components, or nothing.
-  template <class Start>
-  [[nodiscard]] constexpr Momenta slopes_in(const Start& start, const Scalar& unit,
-                                            const Motors& motors,
-                                            const Rates& rates) const noexcept {
-    Momenta result{};
-    for_each_body([&](auto i, const auto& one) {
-      result[i] = one.template slope<has_forque>(start(i), rates[i]);
-    });
-    if constexpr (has_forque) {
-      std::array<Scalar, bodies> weights{};
-      for_each_body([&](auto i, const auto& one) { weights[i] = one.forque_weight(unit); });
-      add_forques(motors, result, weights);
-    }
-    return result;
-  }
-
-  /// What these are to be multiplied by for unit² Ḃ.
-  [[nodiscard]] constexpr Rates rate_weights() const noexcept {
-    Rates result{};
-    for_each_body(
-        [&](auto i, const auto& one) { result[i] = one.template rate_weights<has_forque>(); });
-    return result;
-  }
-
-  /// And for x unit² μ̇.
-  [[nodiscard]] constexpr Momenta momentum_weights(const Scalar& x) const noexcept {
-    Momenta result{};
-    for_each_body(
-        [&](auto i, const auto& one) { result[i] = one.template momentum_weights<has_forque>(x); });
-    return result;
+  /// The same equations of motion with `unit` B in place of μ.
+  [[nodiscard]] constexpr auto in_rates(const Scalar& unit) const noexcept {
+    return RateForm<RigidBodies>(*this, unit);
   }
 
   /// What the free motion, H = T, adds in the time h, less the spins that are apart.
@@ -847,6 +885,8 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   }
 
  private:
+  friend RateForm<RigidBodies>;
+
   /// A function, as g++ sometimes leaves a lambda as a call, for which a state goes through memory.
   template <bool is_outer, bool is_small, std::size_t... i>
   HAMOTOR_INLINE constexpr void turn_each(Motors& motors, Momenta& momenta, const Scalar& h,
@@ -878,6 +918,90 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
 
   std::tuple<Body...> bodies_;
   std::tuple<Interaction...> interactions_;
+};
+
+template <class... Body, class... Interaction>
+class RateForm<RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>>> {
+  using System = RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>>;
+  using S = typename System::Scalar;
+  using Motors = typename System::Motors;
+  using Momenta = typename System::Momenta;
+  using Rates = typename System::Rates;
+  using Forques = std::array<S, System::bodies>;
+  using Each = std::index_sequence_for<Body...>;
+
+ public:
+  /// Keeps a reference to the system.
+  constexpr RateForm(const System& system, const S& unit) noexcept
+      : RateForm(system, unit, Each{}) {}
+
+  /// `unit` B.
+  [[nodiscard]] HAMOTOR_INLINE constexpr Rates rates(const Momenta& momenta) const noexcept {
+    return rates(momenta, Each{});
+  }
+
+  /// unit² μ̇ at these motors and `unit` B, added to `start(i)`: for every body components, or
+  /// nothing.
+  template <class Start>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Momenta slopes(const Start& start, const Motors& motors,
+                                                        const Rates& rates) const noexcept {
+    return slopes(start, motors, rates, Each{}, std::index_sequence_for<Interaction...>{});
+  }
+
+  /// What such slopes are to be multiplied by for unit² Ḃ.
+  [[nodiscard]] constexpr const Rates& rate_weights() const noexcept { return rate_weights_; }
+
+  /// And for x unit² μ̇.
+  [[nodiscard]] constexpr Momenta momentum_weights(const S& x) const noexcept {
+    return momentum_weights(x, Each{});
+  }
+
+ private:
+  template <std::size_t... i>
+  constexpr RateForm(const System& system, const S& unit, std::index_sequence<i...>) noexcept
+      : system_(system),
+        per_momentum_{system.template body<i>().rates_in(unit)...},
+        factors_{system.template body<i>().template slope_factors<System::has_forque>()...},
+        rate_weights_{system.template body<i>().template rate_weights<System::has_forque>()...},
+        interactions_(std::apply(
+            [&](const auto&... interaction) {
+              return std::tuple{
+                  detail::weighted(system, interaction,
+                                   Forques{system.template body<i>().forque_weight(unit)...})...};
+            },
+            system.interactions_)) {}
+
+  template <std::size_t... i>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Rates rates(const Momenta& momenta,
+                                                     std::index_sequence<i...>) const noexcept {
+    return {detail::each_times(per_momentum_[i], momenta[i])...};
+  }
+
+  template <class Start, std::size_t... i, std::size_t... j>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Momenta slopes(const Start& start, const Motors& motors,
+                                                        const Rates& rates,
+                                                        std::index_sequence<i...>,
+                                                        std::index_sequence<j...>) const noexcept {
+    Momenta result{Body::slope(std::get<i>(factors_), start(i), rates[i])...};
+    (std::get<j>(interactions_).add_forque(system_, motors, result), ...);
+    return result;
+  }
+
+  template <std::size_t... i>
+  [[nodiscard]] constexpr Momenta momentum_weights(const S& x,
+                                                   std::index_sequence<i...>) const noexcept {
+    return {system_.template body<i>().template momentum_weights<System::has_forque>(x)...};
+  }
+
+  const System& system_;
+  Rates per_momentum_;
+  std::tuple<decltype(std::declval<Body>().template slope_factors<System::has_forque>())...>
+      factors_;
+  Rates rate_weights_;
+  std::tuple<decltype(detail::weighted(std::declval<const System&>(),
+                                       std::declval<const Interaction&>(),
+                                       std::declval<Forques>()))...>
+      interactions_;
 };
 
 template <class... Body>
