@@ -102,9 +102,13 @@ hamotor::State<typename System::Group, 1, double> member(std::size_t k) {
   return {{State::Element::identity()}, {Momentum::from(mu)}};
 }
 
-/// Operations of a step, a multiply-add counted as two.
+/// Of a step: operations, a multiply-add counted as two, and instructions, counted as one.
+struct Cost {
+  double flops;
+  double slots;
+};
 template <class Problem, template <class> class Method>
-double flops() {
+Cost cost() {
   using S = hamotor::Counted;
   const auto system = Problem::template system<S>();
   using System = std::remove_cvref_t<decltype(system)>;
@@ -129,10 +133,12 @@ double flops() {
   };
   take(1);
   hamotor::Counted::counts.fill(0);
+  hamotor::Counted::fused = 0;
   constexpr int steps = 16;  // after so many, open steps put their motors back
   take(steps);
   const auto& counts = hamotor::Counted::counts;
-  return static_cast<double>(counts[S::additions] + counts[S::products]) / steps;
+  const auto operations = static_cast<double>(counts[S::additions] + counts[S::products]) / steps;
+  return {operations, operations - static_cast<double>(S::fused) / steps};
 }
 
 /// Multiply-adds that wait for nothing: FLOP/s.
@@ -143,7 +149,7 @@ double flops() {
   for (std::size_t k = 0; k < chains; ++k) sums[k] = Lanes(1.0 + static_cast<double>(k));
   const Lanes factor(0.999);
   const Lanes term(0.001);
-  const double taken = shortest(40, [&] {
+  const double taken = shortest(10, [&] {
     [&]<std::size_t... k>(std::index_sequence<k...>) {
       std::tuple local{sums[k]...};
       for (int n = 0; n < rounds; ++n) {
@@ -165,24 +171,28 @@ class Report {
 
   template <class Problem, template <class> class Method>
   void measure(const char* method, bool all_sizes) {
-    const double operations = flops<Problem, Method>();
+    const Cost of_step = cost<Problem, Method>();
     const unsigned cores = std::max(1U, std::thread::hardware_concurrency());
+    const auto one_more = [&](std::size_t bodies, const std::vector<unsigned>& threads) {
+      const auto rates = measured<Problem, Method>(bodies, threads);
+      for (std::size_t k = 0; k < threads.size(); ++k) {
+        add({Problem::name, method, "packs", bodies, threads[k], rates[k], of_step});
+      }
+    };
     for (const std::size_t bodies : {64U, 1024U, 16384U, 1048576U}) {
       if (!all_sizes && bodies != 1024) continue;
-      if (quick_ && bodies > 16384) continue;
-      add(Problem::name, method, "packs", bodies, 1, rate<Problem, Method>(bodies, 1), operations);
-    }
-    if (all_sizes && cores > 1) {
-      const std::size_t bodies = quick_ ? 16384 : 1048576;
-      add(Problem::name, method, "packs", bodies, cores, rate<Problem, Method>(bodies, cores),
-          operations);
+      const std::size_t most = quick_ ? 16384 : 1048576;
+      if (bodies > most) continue;
+      const bool by_all = all_sizes && cores > 1 && bodies == most;
+      one_more(bodies, by_all ? std::vector{1U, cores} : std::vector{1U});
     }
   }
 
   void eigen(const char* problem, EigenResult (*run)(std::size_t, int, int)) {
     for (const std::size_t bodies : {64U, 1024U}) {
       const int steps = steps_for(bodies);
-      add(problem, "rk4", "Eigen", bodies, 1, run(bodies, steps, runs(bodies)).steps_per_second, 0);
+      const double found = run(bodies, steps, 4 * bursts(bodies)).steps_per_second;
+      add({problem, "rk4", "Eigen", bodies, 1, {found, peak()}, {0, 0}});
     }
   }
 
@@ -208,8 +218,6 @@ class Report {
     return apart;
   }
 
-  void note_peak() { peak_ = std::max(peak_, peak()); }
-
   void print(double disagreement) const {
     std::printf(
         "{\"lanes\": %zu, \"isa\": \"%s\", \"cores\": %u, \"peak_flops\": %.6g, "
@@ -234,38 +242,64 @@ class Report {
   [[nodiscard]] static int steps_for(std::size_t bodies) {
     return bodies > 100000 ? 32 : bodies > 4096 ? 256 : static_cast<int>(131072 / bodies);
   }
-  [[nodiscard]] int runs(std::size_t bodies) const {
-    return bodies > 100000 ? 3 : bodies > 4096 ? 10 : quick_ ? 20 : 100;
-  }
+  [[nodiscard]] int bursts(std::size_t bodies) const { return bodies > 4096 ? 6 : quick_ ? 5 : 25; }
 
+  /// Steps a second, and the peak meanwhile: a processor's clock changes.
+  struct Rate {
+    double rate = 0;
+    double peak = 0;
+  };
+
+  /// By so many threads each, all of them in turn.
   template <class Problem, template <class> class Method>
-  [[nodiscard]] double rate(std::size_t bodies, unsigned threads) {
+  [[nodiscard]] std::vector<Rate> measured(std::size_t bodies,
+                                           const std::vector<unsigned>& threads) {
     const auto system = Problem::template system<Lanes>();
     using System = std::remove_cvref_t<decltype(system)>;
     using Ensemble = hamotor::Ensemble<System, Method<System>>;
     std::vector<typename Ensemble::Member> members;
     for (std::size_t k = 0; k < bodies; ++k) members.push_back(member<System>(k));
-    Ensemble ensemble(system, Method<System>{}, 0.0, step, members, threads);
+    std::vector<Ensemble> ensembles;
+    for (const unsigned many : threads) {
+      ensembles.emplace_back(system, Method<System>{}, 0.0, step, members, many);
+    }
     const int steps = steps_for(bodies);
-    const double taken = shortest(
-        runs(bodies),
-        [&] {
-          if (ensemble.advance(steps) != bodies) std::fprintf(stderr, "a body failed\n");
-        },
-        threads == 1 ? own_time : wall_time);
-    note_peak();
-    return static_cast<double>(bodies) * steps / taken;
+    std::vector<Rate> found(threads.size());
+    for (int burst = 0; burst < bursts(bodies); ++burst) {
+      const double now = peak();
+      for (std::size_t k = 0; k < threads.size(); ++k) {
+        const double taken = shortest(
+            bodies > 100000 ? 1 : 4,
+            [&] {
+              if (ensembles[k].advance(steps) != bodies) std::fprintf(stderr, "a body failed\n");
+            },
+            threads[k] == 1 ? own_time : wall_time);
+        found[k].rate = std::max(found[k].rate, static_cast<double>(bodies) * steps / taken);
+        found[k].peak = std::max(found[k].peak, now);
+      }
+    }
+    return found;
   }
 
-  void add(const char* problem, const char* method, const char* contestant, std::size_t bodies,
-           unsigned threads, double rate, double operations) {
+  struct Row {
+    const char* problem;
+    const char* method;
+    const char* contestant;
+    std::size_t bodies;
+    unsigned threads;
+    Rate found;
+    Cost of_step;
+  };
+  void add(const Row& row) {
+    peak_ = std::max(peak_, row.found.peak);
     std::array<char, 512> text{};
     std::snprintf(text.data(), text.size(),
                   "%s  {\"problem\": \"%s\", \"method\": \"%s\", \"contestant\": \"%s\", "
                   "\"bodies\": %zu, \"threads\": %u, \"steps_per_second\": %.6g, "
-                  "\"flops_per_step\": %.4g}",
-                  rows_.empty() ? "" : ",\n", problem, method, contestant, bodies, threads, rate,
-                  operations);
+                  "\"flops_per_step\": %.4g, \"slots_per_step\": %.4g, \"peak_flops\": %.6g}",
+                  rows_.empty() ? "" : ",\n", row.problem, row.method, row.contestant, row.bodies,
+                  row.threads, row.found.rate, row.of_step.flops, row.of_step.slots,
+                  row.found.peak);
     rows_ += text.data();
   }
 
@@ -276,7 +310,6 @@ class Report {
 
 void run(bool quick) {
   Report report(quick);
-  report.note_peak();
   report.measure<FreeRotation, Rk4>("rk4", true);
   report.eigen(FreeRotation::name, eigen_free);
   report.measure<Spring, Rk4>("rk4", true);

@@ -1,8 +1,9 @@
 """`hamotor bench ensemble`: bodies' steps a second in packs of lanes, beside Eigen's one by one.
 
 One C++ program of tests/bench per compiler measures everything in one process, the processor's
-peak included: multiply-adds that wait for nothing, in registers of the same width.  A time is the
-shortest of many runs, because whatever else the machine does only adds to it.  JAX and MuJoCo,
+peak included, beside each row, for clocks change: multiply-adds that wait for nothing, in registers
+of the same width.  A time is the shortest of many runs, because whatever else the machine does only
+adds to it.  JAX and MuJoCo,
 where they are installed, step the same bodies on one core in processes of their own.
 """
 
@@ -93,16 +94,16 @@ def account_rows(said: Mapping[str, Any], compiler: str) -> list[dict[str, Any]]
             f"hamotor bench: Eigen's bodies differ from ours by {said['disagreement']:.2g} of their"
             " angular momentum after a second; they cannot be compared"
         )
-    return [
-        {
-            **row,
-            "compiler": compiler,
-            "share_of_peak": row["steps_per_second"]
-            * row["flops_per_step"]
-            / (said["peak_flops"] * row["threads"]),
+    rows = []
+    for row in said["rows"]:
+        peak = row["peak_flops"] * row["threads"]
+        slots = row["slots_per_step"]
+        shares = {
+            "share_of_peak": row["steps_per_second"] * row["flops_per_step"] / peak,
+            "bound": peak / (2 * slots) if slots else None,
         }
-        for row in said["rows"]
-    ]
+        rows.append({**row, "compiler": compiler, **shares})
+    return rows
 
 
 def _peers(*words: str) -> Any:
@@ -162,7 +163,7 @@ def table(account: Mapping[str, Any]) -> str:
         ),
         (
             f"  {'':<22}{'method':<23}{'bodies':>9}{'cores':>7}{'steps':>9}{'FLOP':>7}"
-            f"{'of peak':>9}{'Eigen':>8}{'ratio':>7}"
+            f"{'of peak':>9}{'bound':>8}{'Eigen':>8}{'ratio':>7}"
         ),
     ]
     seen = dict.fromkeys(
@@ -178,7 +179,7 @@ def table(account: Mapping[str, Any]) -> str:
         text = (
             f"  {problem:<22}{method:<23}{bodies:>9}{threads:>7}"
             f"{row['steps_per_second'] / 1e6:>9.1f}{row['flops_per_step']:>7.0f}"
-            f"{row['share_of_peak']:>9.0%}"
+            f"{row['share_of_peak']:>9.0%}{row['bound'] / 1e6:>8.0f}"
         )
         if eigen is not None and (method, bodies) == ("rk4", IN_CACHE):
             rate = eigen["steps_per_second"]
@@ -188,6 +189,8 @@ def table(account: Mapping[str, Any]) -> str:
         *beside(account),
         *scaling(rows),
         "  FLOP: operations of a step, counted, a multiply-add as two, of which a peak is made up;",
+        "  bound: steps at that peak's clock if every instruction of a step were started as soon as"
+        " one can be;",
         "  Eigen: the same by quaternion and vectors, an array of structures, the best compiler.",
         "  Shortest times on a machine as busy as yours is now: read the ratios.",
     ]

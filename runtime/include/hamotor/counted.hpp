@@ -1,7 +1,7 @@
 // A double that counts what is done with it: operations, and evaluations of a system's gradient.
 //
 // Two numbers that the compiler knows cost nothing, and are not counted.  A multiply-add is one of
-// each.  Comparisons, changes of sign and choices are not counted.
+// each, and counted by itself besides.  Comparisons, changes of sign and choices are not counted.
 #pragma once
 
 #include <algorithm>
@@ -27,6 +27,8 @@ class Counted {
   /// What is told apart; the last one is of `state.hpp`.
   enum Kind : std::size_t { additions, products, quotients, roots, functions, evaluations };
   static inline std::array<std::int64_t, 6> counts{};
+  /// How many of the additions and products are pairs that one instruction does.
+  static inline std::int64_t fused = 0;
 
   Counted() = default;
   template <class Number>
@@ -94,6 +96,15 @@ class Counted {
   friend Counted floor(const Counted& x) noexcept { return std::floor(x.value_); }
   friend Counted atan2(const Counted& y, const Counted& x) noexcept {
     return count(functions, std::atan2(y.value_, x.value_), y, x);
+  }
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Counted multiply_add(const Counted& a,
+                                                                     const Counted& b,
+                                                                     const Counted& c) noexcept {
+    if (std::is_constant_evaluated()) return a * b + c;
+    const auto before = counts[additions] + counts[products];
+    const Counted result = a * b + c;
+    if (counts[additions] + counts[products] == before + 2) ++fused;
+    return result;
   }
   friend constexpr Counted fma(const Counted& a, const Counted& b, const Counted& c) noexcept {
     const Counted twice_rounded = a * b + c;

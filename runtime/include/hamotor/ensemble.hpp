@@ -2,13 +2,14 @@
 //
 // Members are kept in blocks of as many as a pack has lanes: structures of arrays, each block a
 // state, and a stepper, whose numbers are packs.  A block is loaded once for many steps, two are
-// stepped in turn, so that one's operations fill the time in which another's wait, and
-// every thread has a contiguous range of blocks.  No member knows of the others: its bits are the
+// stepped in turn, so that one's operations fill the time in which another's wait, and threads take
+// contiguous pieces.  No member knows of the others: its bits are the
 // same alone.
 #pragma once
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <span>
@@ -142,19 +143,23 @@ class Ensemble {
   /// Every member that is alive takes so many steps; how many still are.
   std::size_t advance(std::int64_t steps) {
     const std::size_t workers = std::min<std::size_t>(threads_, bundles_.size());
-    const auto first_of = [&](std::size_t worker) { return bundles_.size() * worker / workers; };
-    {
-      std::vector<std::jthread> others;
-      for (std::size_t w = 1; w < workers; ++w) {
-        const std::size_t first = first_of(w);
-        const std::size_t last = first_of(w + 1);
-        try {
-          others.emplace_back([=, this] { advance_range(first, last, steps); });
-        } catch (const std::system_error&) {  // no more threads to be had
-          advance_range(first, last, steps);
+    if (workers > 0) {
+      // In pieces, which whoever is free takes: cores are not equally fast, nor left alone.
+      const std::size_t piece = std::max<std::size_t>(1, bundles_.size() / (workers * 16));
+      std::atomic<std::size_t> taken{0};
+      const auto work = [&] {
+        while (true) {
+          const std::size_t first = taken.fetch_add(piece, std::memory_order_relaxed);
+          if (first >= bundles_.size()) return;
+          advance_range(first, std::min(first + piece, bundles_.size()), steps);
         }
+      };
+      std::vector<std::jthread> others;
+      try {
+        for (std::size_t w = 1; w < workers; ++w) others.emplace_back(work);
+      } catch (const std::system_error&) {  // no more threads to be had: the others do it
       }
-      if (workers > 0) advance_range(0, first_of(1), steps);
+      work();
     }
     index_ += steps;
     return static_cast<std::size_t>(std::count_if(

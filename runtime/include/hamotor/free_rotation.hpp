@@ -170,7 +170,16 @@ HAMOTOR_INLINE constexpr void turn_plane(std::array<S, N>& v, std::size_t x, std
                                          const AngleIncrement<S>& by) noexcept {
   const S before = v[x];
   v[x] = mul_add(by.sine, v[y], mul_add(by.cosine_less_one, before, before));
-  v[y] = mul_add(-by.sine, before, mul_add(by.cosine_less_one, v[y], v[y]));
+  v[y] = less_product(by.sine, before, mul_add(by.cosine_less_one, v[y], v[y]));
+}
+
+/// The same by sin θ and 1 − cos θ: no sign is changed where that comes as a product.
+template <class S, std::size_t N>
+HAMOTOR_INLINE constexpr void turn_plane(std::array<S, N>& v, std::size_t x, std::size_t y,
+                                         const S& sine, const S& versine) noexcept {
+  const S before = v[x];
+  v[x] = mul_add(sine, v[y], less_product(versine, before, before));
+  v[y] = less_product(sine, before, less_product(versine, v[y], v[y]));
 }
 
 /// Turns a body in space about its axis E_K, given half the angle: M ↦ M q, and Π and P back.
@@ -188,10 +197,12 @@ HAMOTOR_INLINE constexpr void turn_body(Element& motor, Momentum& momentum,
     turn_plane(m, 4 + i, 4 + j, half);
   }
   motor = Element::from(m);
-  const AngleIncrement<S> whole = half.twice();
+  const S twice = S(2) * half.sine;
+  const S sine = mul_add(twice, half.cosine_less_one, twice);
+  const S versine = twice * half.sine;
   auto mu = momentum.components();
   for (std::size_t first = 0; first < mu.size(); first += 3) {
-    turn_plane(mu, first + i, first + j, whole);
+    turn_plane(mu, first + i, first + j, sine, versine);
   }
   momentum = Momentum::from(mu);
 }
