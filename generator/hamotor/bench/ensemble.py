@@ -189,8 +189,7 @@ def table(account: Mapping[str, Any]) -> str:
         *beside(account),
         *scaling(rows),
         "  FLOP: operations of a step, counted, a multiply-add as two, of which a peak is made up;",
-        "  bound: steps at that peak's clock if every instruction of a step were started as soon as"
-        " one can be;",
+        "  bound: steps at the peak's clock if an instruction were started wherever one can be;",
         "  Eigen: the same by quaternion and vectors, an array of structures, the best compiler.",
         "  Shortest times on a machine as busy as yours is now: read the ratios.",
     ]
