@@ -13,14 +13,13 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from hamotor.bench.contest import Extent
 from hamotor.bench.precision import COMPILERS, measure
 from hamotor.bench.precision_report import by_contestant, meeting
-from hamotor.bench.problems import Problem, problem
+from hamotor.bench.problems import problem
 from hamotor.errors import UsageError
 from hamotor.run.choice import TABLE
 from hamotor.scene import METHODS
@@ -80,19 +79,6 @@ def tabulated(account: Mapping[str, Any], name: str) -> dict[str, Any]:
     }
 
 
-def _problem(asked: str) -> Problem:
-    """NAME, or NAME@END: a motion may be chaotic over the scene's own time."""
-    name, _, end = asked.partition("@")
-    found = problem(name)
-    if not end:
-        return found
-    try:
-        seconds = float(end)
-    except ValueError:
-        raise UsageError(f'"{asked}": what follows @ is the end in seconds') from None
-    return replace(found, simulation=replace(found.simulation, end=seconds))
-
-
 def main(files: Sequence[str]) -> int:
     """Put these scenes and accounts into the table."""
     if not files:
@@ -104,7 +90,7 @@ def main(files: Sequence[str]) -> int:
         if file.endswith(".json"):
             account = json.loads(Path(file).read_text(encoding="utf-8"))
         else:
-            account = measure([_problem(file)], _EXTENT, {}, {})
+            account = measure([problem(file)], _EXTENT, {}, {})
         for name in account["problems"]:
             said = tabulated(account, name)
             structure = said.pop("structure")

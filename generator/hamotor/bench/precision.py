@@ -17,6 +17,7 @@ from dataclasses import asdict, replace
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -54,13 +55,13 @@ from hamotor.bench.precision_report import (
     table,
     write_report,
 )
-from hamotor.bench.problems import GOALS, TARGETS, Problem, own_problems, problem
+from hamotor.bench.problems import GOALS, TARGETS, Problem, default_problems, own_problems, problem
 from hamotor.errors import HamotorError, ToolError, UsageError
 from hamotor.files import write_whole
 from hamotor.run.build import default_cache, find_compiler, flags_for
 from hamotor.run.library import SceneLibrary
 from hamotor.run.report import to_json
-from hamotor.run.simulation import Simulation, load
+from hamotor.run.simulation import Compiled, Simulation, load
 from hamotor.scene import METHODS
 from hamotor.scene.scalars import COUNTED
 
@@ -84,14 +85,12 @@ QUICK: Final = Extent(
     3, 2.0, 0.004, 0.02, False, COMPILERS[:1],
     methods=("rkmk4", "rkmk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
-QUICK_PROBLEMS: Final = ("P1", "P3", "P4")
+_TYPICAL_S: Final = {"whole": 130.0, "part": 60.0, "quick": 35.0}
+"""What a problem takes on two cores of 3 GHz."""
 
 
 _THE_SAME_WORK: Final = ("rk", "cf", "splitting")
 """Methods whose steps take as many operations in any scalar."""
-_FEW: Final = 8
-"""Of more methods than these one library counts all, in a fifth of the time; a series has text of
-its own."""
 
 
 def bench_precision(
@@ -104,17 +103,18 @@ def bench_precision(
 ) -> dict[str, Any]:
     """Run and account for the benchmark of precision.
 
-    scenes: names or paths of scenes; the benchmark's own problems if not given.  out: where
-    precision.json, the diagrams and precision.html go, written again after every problem, and
-    precision_NAME.json, from which a later call takes what it would only measure again; None:
-    nowhere.  json: print the account on stdout instead of the table.  quick: a method of each
-    family, three problems, fewer settings and repetitions, one compiler, no other kernels or
-    scalars, nothing counted.  with_peers: first install the public solvers that come from PyPI.
-    drift: steps of the long runs, a million if not given, none if quick.
+    scenes: names or paths of scenes, NAME@END to end at this time (s); if not given the benchmark's
+    own problems and all bundled scenes, of which one of each structure in each algebra has other
+    kernels, representations, algebras, scalars and compilers, too.  out: where precision.json, the
+    diagrams and precision.html go, written again after every problem, and precision_NAME.json, from
+    which a later call takes what it would only measure again; None: nowhere.  json: print the
+    account on stdout instead of the table.  quick: a method of each family, fewer settings and
+    repetitions, one compiler, no other kernels or scalars, nothing counted.  with_peers: first
+    install the public solvers that come from PyPI.  drift: steps of the long runs, a million if not
+    given, none if quick.
     Returns the account.  Raises UsageError and ToolError as `hamotor run` does.
     """
-    names = dict.fromkeys(scenes or (QUICK_PROBLEMS if quick else own_problems()))
-    problems = [problem(name) for name in names]
+    problems = [problem(name) for name in dict.fromkeys(scenes or default_problems())]
     gaps: dict[str, str] = {}
     if with_peers:
         solvers.install_peers()
@@ -122,9 +122,22 @@ def bench_precision(
     extent = QUICK if quick else FULL
     if drift is not None:
         extent = replace(extent, drift=drift)
-    account = measure(problems, extent, peers, gaps, out)
+    alike = {} if scenes or quick else alike_to(problems)
+    account = measure(problems, extent, peers, gaps, out, alike)
     publish(account, table, out=None, as_json=json)
     return account
+
+
+def alike_to(problems: Sequence[Problem]) -> dict[str, str]:
+    """Of problems that are not the benchmark's own: those whose structure and algebra another one
+    before them has, and which that is."""
+    first: dict[tuple[str, str], str] = {}
+    found = {}
+    for one in problems:
+        name = first.setdefault((one.simulation.structure, one.algebra), one.name)
+        if name != one.name and one.name not in own_problems():
+            found[one.name] = name
+    return found
 
 
 def measure(
@@ -133,31 +146,45 @@ def measure(
     peers: Mapping[str, str],
     gaps: Mapping[str, str],
     out: Path | None = None,
+    alike: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """The account of these problems, with the peers there are (package → version).
 
     With `out` the report is written after each problem; what was measured before with all the same
     is read from there.  Of several problems those that cannot be measured are gaps; one alone
-    raises.
+    raises.  alike: what each of these is so like that only generated kernels in double are measured
+    of it, with one compiler.
     """
     about = _provenance(_compilers(extent), peers, extent)
     missing = dict(gaps)
+    extents = {
+        one.name: replace(extent, forms=False, counted=False, compilers=extent.compilers[:1])
+        if one.name in alike
+        else extent
+        for one in problems
+    }
+    kept: dict[str, Mapping[str, Any]] = {}
+    for one in problems:
+        part = _read(_file_of(one, out), _key(one, extents[one.name], about))
+        if part is not None:
+            kept[one.name] = part
+    left = Left([_typical_s(extents[p.name]) for p in problems if p.name not in kept])
     parts: dict[str, Mapping[str, Any]] = {}
-    took: list[float] = []
     for index, one in enumerate(problems):
-        left = len(problems) - index
-        say(
-            f"{one.name}: {index + 1} of {len(problems)} problems"
-            + (f", about {in_words(left * sum(took) / len(took))} for these {left}" if took else "")
-        )
-        began = time.perf_counter()
-        kept = out / f"precision_{one.name}.json" if out is not None else None
-        key = _key(one, extent, about)
-        part = _read(kept, key)
+        own = extents[one.name]
         try:
-            if part is None:
-                part = {"key": key, **_measured(one, extent, peers)}
-                took.append(time.perf_counter() - began)
+            if one.name in kept:
+                parts[one.name] = kept[one.name]
+            else:
+                say(f"{one.name}: {index + 1} of {len(problems)} problems, {left}")
+                measured = _measured(one, own, peers)
+                if one.name in alike:
+                    of = alike[one.name]
+                    measured["missing"][f"other forms and compilers on {one.name}"] = (
+                        f"left out: its structure and algebra are those of {of}, which has them;"
+                        f" bench precision {one.name} measures them"
+                    )
+                parts[one.name] = {"key": _key(one, own, about), **measured}
         except KeyboardInterrupt:
             done = ", ".join(parts) or "no problem yet"
             say(f"hamotor bench: kept: {done}; the same command goes on with {one.name}")
@@ -168,20 +195,53 @@ def measure(
             missing[one.name] = str(refusal)
             say(f"{one.name}: {refusal}")
             continue
-        parts[one.name] = part
-        if out is None or kept is None:
+        finally:
+            if one.name not in kept:
+                left.done()
+        file = _file_of(one, out)
+        if out is None or file is None:
             continue
         out.mkdir(parents=True, exist_ok=True)
-        write_whole(kept, to_json(part))
+        write_whole(file, to_json(parts[one.name]))
         waiting = {
             p.name: "not measured yet; the same command goes on" for p in problems[index + 1 :]
         }
         account = _account(parts, {**missing, **waiting}, about)
-        for file in write_report(account, out, [one.name]):
-            say(f"wrote {file}")
+        for written in write_report(account, out, [one.name]):
+            say(f"wrote {written}")
     if not parts:
         raise UsageError("hamotor bench: none of these scenes can be measured; see above")
     return _account(parts, missing, about)
+
+
+def _file_of(one: Problem, out: Path | None) -> Path | None:
+    return None if out is None else out / f"precision_{one.name}.json"
+
+
+def _typical_s(extent: Extent) -> float:
+    """What a problem takes on an ordinary machine; long runs up to half a minute for a million
+    steps are in it."""
+    kind = "whole" if extent.forms else "quick" if extent.methods else "part"
+    return _TYPICAL_S[kind] + 4 * (_longest_s(extent.drift) - _LONGEST_RUN_S) * bool(extent.drift)
+
+
+class Left:
+    """How long is left: what is typical, times how much longer than that it took until now."""
+
+    def __init__(self, typical_s: Sequence[float]) -> None:
+        self._typical_s, self._done = list(typical_s), 0
+        self._began = time.perf_counter()
+
+    def done(self) -> None:
+        """One more is."""
+        self._done += 1
+
+    def __str__(self) -> str:
+        took = time.perf_counter() - self._began
+        factor = took / sum(self._typical_s[: self._done]) if self._done else 1.0
+        left = factor * sum(self._typical_s[self._done :])
+        machine = "" if self._done else " on two cores"
+        return f"about {in_words(left)} for the {len(self._typical_s) - self._done} left{machine}"
 
 
 def _account(
@@ -403,40 +463,40 @@ def _scenes(
             choices += [(form, m) for m in methods if m in offered]
     if only is not None:
         choices = [choice for choice in choices if choice[-1] in only]
+    together: dict[Form, list[str]] = {}
+    for form, method in choices:
+        alike = form.scalar == "double" or method.startswith(_THE_SAME_WORK)
+        if extent.counted and form.representation == "ga" and alike:
+            together.setdefault(replace(form, scalar=COUNTED), []).append(method)
+        together.setdefault(form, []).append(method)
+    wanted = [(form, tuple(dict.fromkeys(methods))) for form, methods in together.items()]
+    wanted.sort(key=lambda each: (each[0].scalar == COUNTED, len(each[1])), reverse=True)
+    progress = Progress(
+        f"{one.name}: compiling with {compiler}, libraries: {len(wanted)}", len(wanted)
+    )
+
+    def compiled(each: tuple[Form, tuple[str, ...]]) -> Mapping[str, Compiled | str]:
+        simulation = _in_form(one, each[0])
+        assert simulation is not None
+        built = _together(simulation, *each)
+        progress.add()
+        return built
+
     cache = default_cache() / "precision" / one.name
+    with environment(CXX=compiler, HAMOTOR_CACHE=str(cache)), ThreadPoolExecutor(2) as pool:
+        found = dict(zip((form for form, _ in wanted), pool.map(compiled, wanted), strict=True))
 
-    def compiled_to_count(by: tuple[Form, str | None]) -> SceneLibrary:
-        form, method = by
-        simulation = _in_form(one, form)
+    def contestant(form: Form, method: str) -> Contestant | Row:
+        simulation, built = _in_form(one, form), found[form][method]
         assert simulation is not None
-        built = simulation.compile(scalar=COUNTED, kernels=form.kernels, method=method)
-        progress.add()
-        return built.library
-
-    def compiled(choice: tuple[Form, str]) -> Contestant | Row:
-        found = _compiled(choice)
-        progress.add()
-        return found
-
-    def _compiled(choice: tuple[Form, str]) -> Contestant | Row:
-        form, method = choice
-        simulation = _in_form(one, form)
-        assert simulation is not None
+        counted = found.get(replace(form, scalar=COUNTED), {}).get(method)
         if form.algebra:
             form = replace(form, algebra=str(one.conformal.scene.algebra))  # type: ignore[union-attr]
-
-        try:
-            built = simulation.compile(
-                scalar=form.scalar,
-                kernels=form.kernels,
-                representation=form.representation,
-                method=method,
-            )
-        except HamotorError as refusal:
+        if isinstance(built, str):
             return Row(
                 one.name, method, "hamotor", form.label, compiler, form.kernels,
                 form.representation, form.algebra or one.algebra, form.scalar, 0.0, "step",
-                failure=str(refusal).splitlines()[0],
+                failure=built,
             )  # fmt: skip
         description = built.description
         controlled = method in description.error_controlled
@@ -461,33 +521,42 @@ def _scenes(
                 "columns": len(description.columns),
                 "description": description,
             },
-            counted=counting.get(choice),
+            counted=counted.library if isinstance(counted, Compiled) else None,
         )
 
-    # A method that the list names and this scene's library has not got is a gap of the list.
-    with environment(CXX=compiler, HAMOTOR_CACHE=str(cache)), ThreadPoolExecutor(2) as pool:
-        by = {
-            (form, method): (
-                replace(form, scalar="double"),
-                None if len(choices) > _FEW and method != "taylor" else method,
-            )
-            for form, method in choices
-            if extent.counted
-            and form.representation == "ga"
-            and (form.scalar == "double" or method.startswith(_THE_SAME_WORK))
-        }
-        each = dict.fromkeys(by.values())
-        progress = Progress(
-            f"{one.name}: compiling with {compiler}, libraries: {len(choices) + len(each)}",
-            len(choices) + len(each),
-        )
-        libraries = dict(zip(each, pool.map(compiled_to_count, each), strict=True))
-        counting = {choice: libraries[of] for choice, of in by.items()}
-        found = list(pool.map(compiled, choices))
+    each = [contestant(*choice) for choice in choices]
     return (
-        [c for c in found if isinstance(c, Contestant)],
-        [r for r in found if isinstance(r, Row)],
+        [c for c in each if isinstance(c, Contestant)],
+        [r for r in each if isinstance(r, Row)],
     )
+
+
+def _together(
+    simulation: Simulation, form: Form, methods: tuple[str, ...]
+) -> dict[str, Compiled | str]:
+    """A library with all these methods, or why one cannot be compiled.
+
+    One takes a fifth of the time that one for each does, and a method's steps as long as in a
+    library of its own, to 4 %.  What is only counted is compiled for less time: what -O1 folds is
+    what -O3 does, to two operations a step.
+    """
+    try:
+        built = simulation.compile(
+            scalar=form.scalar,
+            kernels=form.kernels,
+            representation=form.representation,
+            method=methods,
+            extra_flags=("-O1",) if form.scalar == COUNTED else (),
+        )
+    except HamotorError as refusal:
+        if len(methods) == 1:
+            return {methods[0]: str(refusal).splitlines()[0]}
+        # Only a series has text of its own, which not every scene has.
+        series = tuple(m for m in methods if m == "taylor")
+        others = tuple(m for m in methods if m != "taylor")
+        parts = [series, others] if series else [(m,) for m in methods]
+        return {m: c for part in parts for m, c in _together(simulation, form, part).items()}
+    return dict.fromkeys(methods, built)
 
 
 def _in_form(one: Problem, form: Form) -> Simulation | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -25,7 +26,7 @@ from hamotor.run.build import default_cache, default_includes, headers_digest
 from hamotor.run.library import Description, SceneLibrary
 from hamotor.run.report import to_json
 from hamotor.run.simulation import Simulation, load
-from hamotor.scene import Scene, find_scene
+from hamotor.scene import Scene, bundled_scenes, find_scene
 from hamotor.scene.motors import rotation_matrix
 
 ROOT: Final = Path(__file__).resolve().parents[3]
@@ -102,9 +103,14 @@ class Problem:
     def reference(self) -> Reference:
         """From `tests/references`, or else computed in 50 digits and again in quad."""
         file = REFERENCES / f"{self.name}.json"
-        if file.is_file() and isinstance(self.scene, Scene):
+        if file.is_file() and isinstance(self.scene, Scene) and not self._is_cut:
             return _from_digits(file, self)
         return _computed(self.simulation)
+
+    @property
+    def _is_cut(self) -> bool:
+        """Whether it ends elsewhere than its scene."""
+        return bool(self.simulation.end != self.scene.time.end)
 
     @cached_property
     def norm(self) -> str:
@@ -123,7 +129,7 @@ class Problem:
         for them by hand, or else equations generated from the scene."""
         by_hand = _for_peers(self.scene)
         if not isinstance(by_hand, str):
-            return by_hand
+            return {**by_hand, "end": self.simulation.end}
         generated = self.equations
         if isinstance(generated, str):
             return f"{by_hand}, and {generated}"
@@ -161,17 +167,28 @@ class Problem:
             return endpoint.of_row(library.description, live.observe())
 
 
-def problem(name: str) -> Problem:
-    """One of the benchmark's own problems, a bundled scene or a scene file.  Raises UsageError."""
+def problem(asked: str) -> Problem:
+    """One of the benchmark's own problems, a bundled scene or a scene file; NAME@END: to this time,
+    s, instead of the scene's own.  Raises UsageError."""
+    name, _, end = asked.rpartition("@") if "@" in asked else (asked, "", "")
     own = SCENES / f"{name}.toml"
     text = own if own.is_file() else name
     try:
-        return Problem(Path(name).stem, load(text), text)
+        found = Problem(Path(name).stem, load(text), text)
     except UsageError as refusal:
         if own.is_file() or Path(name).exists():
             raise
         said, known = str(refusal).rstrip("."), ", ".join(own_problems())
         raise UsageError(f"{said}. The benchmark's own problems are {known}.") from None
+    if not end:
+        return found
+    try:
+        seconds = float(end)
+    except ValueError:
+        seconds = math.nan
+    if not 0 < seconds < math.inf:
+        raise UsageError(f'"{asked}": what follows @ is the end, in seconds')
+    return replace(found, simulation=replace(found.simulation, end=seconds))
 
 
 _TWINS: Final = {"pga3": ("cga3", "SE3"), "pga2": ("cga2", "SE2")}
@@ -197,7 +214,7 @@ def _conformal(one: Problem) -> Problem | str:
     file.parent.mkdir(parents=True, exist_ok=True)
     write_whole(file, "\n".join([f'algebra = "{algebra}"', f'group = "{group}"', *kept]) + "\n")
     try:
-        return Problem(one.name, load(file))
+        return Problem(one.name, replace(load(file), end=one.simulation.end))
     except HamotorError as refusal:
         return str(refusal).splitlines()[0]
 
@@ -205,6 +222,17 @@ def _conformal(one: Problem) -> Problem | str:
 def own_problems() -> list[str]:
     """Names of the problems that have scenes of their own."""
     return sorted(file.stem for file in SCENES.glob("*.toml"))
+
+
+def default_problems() -> list[str]:
+    """The benchmark's own problems and the bundled scenes, chaotic ones to where a reference can
+    be had."""
+    own = own_problems()
+    scenes = [name for name, _ in bundled_scenes() if name not in own]
+    return own + [f"{name}@{_ENDS[name]:g}" if name in _ENDS else name for name in scenes]
+
+
+_ENDS: Final = {"two_bodies": 2.0}
 
 
 def _from_digits(file: Path, one: Problem) -> Reference:
@@ -315,8 +343,9 @@ def _computed(simulation: Simulation) -> Reference:
     if not kept:
         columns = description.state_columns()
         row, witnesses = _end_of(simulation, method, scalar, tolerance)[1], []
+        together = [m for m, s, _ in runs if s == runs[-1][1]]
         for other in runs[1:]:
-            _, there, setting = _end_of(simulation, *other)
+            _, there, setting = _end_of(simulation, *other, compiled_with=together)
             apart = float(max(abs(Fraction(row[c]) - Fraction(there[c])) for c in columns))
             witnesses.append(asdict(Witness(other[0], other[1], setting, apart)))
         kept = {"row": row, "witnesses": witnesses}
@@ -346,10 +375,11 @@ def _setting(simulation: Simulation, tolerance: float) -> str:
 
 
 def _end_of(
-    simulation: Simulation, method: str, scalar: str, tolerance: float
-) -> tuple[Description, list[str], str]:
+    simulation: Simulation, method: str, scalar: str, tolerance: float,
+    compiled_with: Sequence[str] = (),
+) -> tuple[Description, list[str], str]:  # fmt: skip
     """What the row at the end holds, the row in decimals with all digits, and how it was made."""
-    library = simulation.compile(scalar=scalar, method=method).library
+    library = simulation.compile(scalar=scalar, method=compiled_with or method).library
     parts = 16 if tolerance else _steps(simulation)  # an answer to Ctrl-C now and then
     step = Fraction(simulation.end) / parts
     with library.start(
@@ -400,6 +430,5 @@ def _for_peers(scene: Any) -> Mapping[str, Any] | str:
         "stiffness": springs[0].stiffness if springs else 0.0,
         "rest_length": springs[0].rest_length if springs else 0.0,
         "at": list(springs[0].at) if springs else [0.0, 0.0, 0.0],
-        "end": scene.time.end,
         "state": [float(x) for x in state],
     }

@@ -90,17 +90,18 @@ class Simulation:
         scalar: str = "double",
         kernels: str = "generated",
         representation: str = "ga",
-        method: str | None = None,
+        method: str | Sequence[str] | None = None,
         compensated: bool | None = None,
         ensembles: bool = False,
+        extra_flags: Sequence[str] = (),
         progress: Progress | None = None,
     ) -> Compiled:
-        """The scene's shared library with one method, compiled or found in the cache, and loaded.
+        """The scene's shared library with a method, compiled or found in the cache, and loaded.
 
-        `method` is all that the scene offers if not given, `compensated` how each sums up its
-        steps; see `run`.  `ensembles`: that steps many members,
-        too.  Raises UsageError for an unknown
-        scalar, kernels, representation or method, ToolError when compilation fails.
+        `method` is one, or several, all that the scene offers if not given, `compensated` how each
+        sums up its steps; see `run`.  `ensembles`: that steps many members, too.  `extra_flags`:
+        for the compiler.  Raises UsageError for an unknown scalar, kernels, representation or
+        method, ToolError when compilation fails.
         """
         from hamotor.scene.scalars import parse_scalar
 
@@ -114,6 +115,7 @@ class Simulation:
                     f'unknown {name} "{value}"; there is {", ".join(allowed)}.'
                     f"{suggest(value, allowed)}"
                 )
+        methods = () if method is None else (method,) if isinstance(method, str) else tuple(method)
         started = time.perf_counter()
         if representation == "matrix":
             if kernels != "generated":
@@ -129,14 +131,15 @@ class Simulation:
                 raise UsageError("the matrix form has plain sums; leave compensated out.")
             source = self.matrix_source(scalar)
         else:
-            own_text: tuple[str, ...] = (method,) if method == "taylor" else ()
+            own_text: tuple[str, ...] = ("taylor",) if "taylor" in methods else ()
             if ensembles and self.ensemble.parameters:
-                own_text = (method or "", "drawn")
+                own_text = (*(own_text or methods[:1] or ("",)), "drawn")
             source = self.source(kernels, scalar, *own_text)
-        if method is not None and self.methods:
+        if methods and self.methods:
             offered = self.offered(kernels, representation)
-            check_method(method, self.offered_to_ensembles if ensembles else offered)
-            source = f'#define HAMOTOR_METHOD "{method}"\n{source}'
+            for one in methods:
+                check_method(one, self.offered_to_ensembles if ensembles else offered)
+            source = f'#define HAMOTOR_METHOD "{" ".join(methods)}"\n{source}'
         if compensated is not None:
             source = f"#define HAMOTOR_COMPENSATED {str(compensated).lower()}\n{source}"
         if ensembles:
@@ -147,6 +150,7 @@ class Simulation:
             source,
             libraries=(eigen(),) if representation == "matrix" else (),
             scalar=scalar,
+            extra_flags=extra_flags,
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
         return Compiled(build, SceneLibrary(build.library), generate_s, source)

@@ -452,6 +452,7 @@ class RateStages {
     constexpr int halves = number == 2 ? 2 : 1;
     Place there{};
     Slopes along{};
+    note_evaluations<S>(1);
     along.momenta = form_.slopes(nothing, here.motors, here.rates);
     for (std::size_t i = 0; i < n; ++i) {
       if constexpr (sums_places) {
@@ -476,6 +477,7 @@ class RateStages {
   HAMOTOR_INLINE constexpr void add_last(const S& /*t*/, const Place& here,
                                          Sum& sum) const noexcept {
     const auto start = [&](std::size_t i) { return sum.momenta[i].components(); };
+    note_evaluations<S>(1);
     sum.momenta = form_.slopes(start, here.motors, here.rates);
     for (std::size_t i = 0; i < n; ++i) {
       sum.motors[i] =
