@@ -79,3 +79,8 @@ def test_the_table_is_readable() -> None:
     assert lines[0].split() == ["body", "quantity", "at", "the", "end", "at", "most", "unit"]
     assert any(line.startswith("bob") and line.endswith("rad") for line in lines)
     assert lines[-1] == "over 1,001 common times to t = 10 s"
+    *_, over, ends = table(
+        compare(toy().run(step=0.01), toy().run(step=0.02, end=9.0))
+    ).splitlines()
+    assert over == "over 451 common times to t = 9 s, of 1,001 recorded"
+    assert ends == "the runs end at t = 10 s and 9 s: the rest is not compared"

@@ -96,6 +96,11 @@ def test_events_of_a_turning_body_are_found_and_end_the_run(
     assert "landing happened at t = " in run.summary()
     again = stone.run()
     np.testing.assert_array_equal(again.events["t"], run.events["t"])
+    comparison = hamotor.compare(stone.run(interval=0.25), stone.run(interval=0.25, end=1.0))
+    (apex,) = (d for d in comparison.differences if d.quantity == "time of apex")
+    assert apex.unit == "s"
+    assert apex.largest < 1e-9
+    assert comparison.notes == ("landing happened 1 and 0 times",)
 
 
 def test_rows_at_times_leave_the_steps_as_they_are(stone: hamotor.Simulation) -> None:

@@ -33,6 +33,12 @@ class Comparison:
     times: int
     last_time: float
     differences: tuple[Difference, ...]
+    ends: tuple[float, float] = (0.0, 0.0)
+    """When each run ends, s."""
+    recorded: tuple[int, int] = (0, 0)
+    """How many times each recorded."""
+    notes: tuple[str, ...] = ()
+    """What else tells the runs apart."""
 
     @property
     def largest(self) -> float:
@@ -42,7 +48,8 @@ class Comparison:
 
 
 def compare(one: Run, other: Run) -> Comparison:
-    """Attitude (rad), position (m), momenta (their units) per body, and energy (J).
+    """Attitude (rad), position (m), momenta (their units) per body, energy (J) and when events
+    happened (s), the first of a name in one run beside the first in the other, and so on.
 
     Compared at the times that both runs recorded.  Raises UsageError when the runs do not hold the
     same bodies in the same space, or share no time.
@@ -56,13 +63,43 @@ def compare(one: Run, other: Run) -> Comparison:
     if not len(here) or (one.t[here[-1]] == 0 and (one.t[-1] or other.t[-1])):
         raise UsageError(
             "the runs share no recorded time after the start; "
-            "run both with the same step and every."
+            "run both with the same interval, or the same step and every."
         )
     differences = [
         Difference(body, quantity, unit, float(distance[-1]), float(distance.max()))
         for body, quantity, unit, distance in _distances(one, here, other, there)
     ]
-    return Comparison(len(here), float(one.t[here[-1]]), tuple(differences))
+    times, notes = _events(one, other)
+    return Comparison(
+        len(here),
+        float(one.t[here[-1]]),
+        (*differences, *times),
+        (float(one.t[-1]), float(other.t[-1])),
+        (len(one.t), len(other.t)),
+        notes,
+    )
+
+
+def _events(one: Run, other: Run) -> tuple[list[Difference], tuple[str, ...]]:
+    """How far apart in time events are, and which did not happen as often in both runs."""
+    found, notes = [], []
+    first, second = (
+        {str(name): run.events["t"][run.events["event"] == name] for name in run.events["event"]}
+        if run.events
+        else {}
+        for run in (one, other)
+    )
+    for name in dict.fromkeys([*first, *second]):
+        here, there = first.get(name, np.zeros(0)), second.get(name, np.zeros(0))
+        both = min(len(here), len(there))
+        if both:
+            apart = np.abs(here[:both] - there[:both])
+            found.append(
+                Difference("", f"time of {name}", "s", float(apart[-1]), float(apart.max()))
+            )
+        if len(here) != len(there):
+            notes.append(f"{name} happened {len(here):,} and {len(there):,} times")
+    return found, tuple(notes)
 
 
 _KINDS = {"kg m^2/s": "angular momentum", "kg m/s": "linear momentum"}
@@ -122,5 +159,13 @@ def table(comparison: Comparison) -> str:
     ]
     widths = [max(len(row[k]) for row in rows) for k in range(5)]
     lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows]
-    lines.append(f"over {comparison.times:,} common times to t = {comparison.last_time:.6g} s")
+    counts = [n for n in dict.fromkeys(comparison.recorded) if n > comparison.times]
+    of = f", of {' and '.join(f'{n:,}' for n in counts)} recorded" if counts else ""
+    lines.append(f"over {comparison.times:,} common times to t = {comparison.last_time:.6g} s{of}")
+    beyond = [end for end in comparison.ends if abs(end) > abs(comparison.last_time)]
+    apart = max((abs(end - comparison.last_time) for end in beyond), default=0.0)
+    if apart > _SAME_TIME * max(map(abs, comparison.ends)):
+        one, other = comparison.ends
+        lines.append(f"the runs end at t = {one:.6g} s and {other:.6g} s: the rest is not compared")
+    lines += comparison.notes
     return "\n".join(line.rstrip() for line in lines)

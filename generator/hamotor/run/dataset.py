@@ -303,7 +303,10 @@ def _read_parts(parts: list[Path]) -> Iterator[dict[str, NDArray[np.float64]]]:
     import pyarrow.parquet as pq
 
     for part in parts:
-        table: Any = pq.read_table(part)
+        try:
+            table: Any = pq.read_table(part)
+        except (OSError, ValueError) as error:
+            raise UsageError(f"{part} cannot be read: {str(error).splitlines()[0]}") from None
         yield {name: table.column(name).to_numpy() for name in table.column_names}
 
 
