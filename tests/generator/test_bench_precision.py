@@ -22,9 +22,17 @@ from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
 from hamotor.bench.precision_report import best, coverage, over_problems, table
-from hamotor.bench.problems import REFERENCES, Problem, Reference, own_problems, problem
+from hamotor.bench.problems import (
+    REFERENCES,
+    Problem,
+    Reference,
+    default_problems,
+    own_problems,
+    problem,
+)
 from hamotor.bench.summary import summary
 from hamotor.errors import UsageError
+from hamotor.scene import bundled_scenes
 
 
 @pytest.mark.parametrize("name", own_problems())
@@ -278,6 +286,45 @@ def test_other_forms_begin_where_a_method_does_not_fail() -> None:
     first += [{"contestant": "gauss8", "setting": 1.0, "failure": "not finite"}]
     found = precision.begun_where_they_do_not_fail([own, quad], first)
     assert found == [own, replace(quad, settings=settings[1:])]
+    slow = [{"contestant": "gauss8", "best_us": us, "failure": None} for us in (3e6, 1.1e6)]
+    assert precision.too_slow_for_other_forms([own, quad], slow) == [quad]
+    slow[1]["best_us"] = 0.9e6
+    assert not precision.too_slow_for_other_forms([own, quad], slow)
+
+
+def test_of_each_structure_in_each_algebra_one_problem_is_measured_in_all_forms() -> None:
+    default = {name.partition("@")[0] for name in default_problems()}
+    assert default == {*own_problems(), *(name for name, _ in bundled_scenes())}
+    some = [problem(name) for name in ("P3", "P3b+", "heavy_top", "planar", "kirchhoff", "kepler")]
+    alike = precision.alike_to(some)
+    assert alike == {"P3b+": "P3", "heavy_top": "P3", "kepler": "kirchhoff"}
+    said = str(precision.Left([130.0, 50.0]))
+    assert said == "about 3 min for the 2 left on two cores"
+
+
+def test_a_problem_may_end_earlier() -> None:
+    cut = problem("P4@1.5")
+    assert (cut.name, cut.simulation.end) == ("P4", 1.5)
+    assert cut.for_peers["end"] == 1.5  # type: ignore[index]
+    assert not isinstance(cut.conformal, str)
+    assert cut.conformal.simulation.end == 1.5
+    with pytest.raises(UsageError, match="the end, in seconds"):
+        problem("P4@soon")
+
+
+def test_what_had_to_wait_for_the_processor_is_not_slow() -> None:
+    class Timed:
+        set_up_s = 0.0
+
+        def run(self, _: int) -> peers.Result:
+            watch = peers.Watch()
+            watch.seconds, watch.processor = [0.03], [0.001]
+            return peers.Result(watch, [0.0], 1, 1)
+
+    entry = stopwatch.Entry({"index": 0, "setting": 0}, Timed())
+    entry.run()
+    assert entry.was_disturbed
+    assert entry.needs_s == 0.001
 
 
 def test_what_there_is_is_counted_by_problem() -> None:

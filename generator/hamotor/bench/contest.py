@@ -114,6 +114,8 @@ class Extent:
     compilers: Sequence[str]
     drift: int = 0
     """Steps of the long runs; 0: none."""
+    longest_run_s: float = 10.0
+    """That one of them may take; what would take longer takes fewer steps."""
     counted: bool = False
     """Whether operations are counted."""
     methods: Sequence[str] = ()

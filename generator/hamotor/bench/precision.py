@@ -66,9 +66,6 @@ from hamotor.scene import METHODS
 from hamotor.scene.scalars import COUNTED
 
 COMPILERS: Final = ("g++", "clang++")
-_LONGEST_RUN_S: Final = 10.0
-"""That a long run of a million steps may take; of more steps in proportion, a tenth of it."""
-
 _FORMS: Final = (
     (Form(kernels="generic"), ("rkmk4", "rk4", "rkmk87", "gauss6")),
     (Form(kernels="sparse"), ("rkmk4", "rk4", "rkmk87", "gauss6")),
@@ -80,13 +77,15 @@ _FORMS: Final = (
 )
 """Kernels, representation, algebra and scalar beside the generated ones in double, with methods."""
 
-FULL: Final = Extent(8, 2 ** (1 / 3), 0.015, 0.15, True, COMPILERS, 10**6, counted=True)
+FULL: Final = Extent(8, 2 ** (1 / 3), 0.015, 0.15, True, COMPILERS, 10**6, 3.0, counted=True)
 QUICK: Final = Extent(
-    3, 2.0, 0.004, 0.02, False, COMPILERS[:1],
+    3, 2.0, 0.01, 0.02, False, COMPILERS[:1],
     methods=("rkmk4", "rkmk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
-_TYPICAL_S: Final = {"whole": 130.0, "part": 60.0, "quick": 35.0}
-"""What a problem takes on two cores of 3 GHz."""
+_TYPICAL_S: Final = {"whole": 120.0, "part": 40.0, "quick": 35.0}
+"""What a problem takes on two cores of 3 GHz, without long runs."""
+_LONG_RUNS: Final = 12.0
+"""How many times as long as one of a problem's long runs may take all of them take."""
 
 
 _THE_SAME_WORK: Final = ("rk", "cf", "splitting")
@@ -121,7 +120,7 @@ def bench_precision(
     peers = solvers.peers_here(gaps)
     extent = QUICK if quick else FULL
     if drift is not None:
-        extent = replace(extent, drift=drift)
+        extent = replace(extent, drift=drift, longest_run_s=max(10.0, drift / 1e6))
     alike = {} if scenes or quick else alike_to(problems)
     account = measure(problems, extent, peers, gaps, out, alike)
     publish(account, table, out=None, as_json=json)
@@ -129,15 +128,21 @@ def bench_precision(
 
 
 def alike_to(problems: Sequence[Problem]) -> dict[str, str]:
-    """Of problems that are not the benchmark's own: those whose structure and algebra another one
-    before them has, and which that is."""
+    """Problems whose structure and algebra another one before them has, and which that is."""
     first: dict[tuple[str, str], str] = {}
-    found = {}
     for one in problems:
-        name = first.setdefault((one.simulation.structure, one.algebra), one.name)
-        if name != one.name and one.name not in own_problems():
-            found[one.name] = name
-    return found
+        first.setdefault((one.simulation.structure, one.algebra), one.name)
+    firsts = {one.name: first[one.simulation.structure, one.algebra] for one in problems}
+    return {name: of for name, of in firsts.items() if of != name}
+
+
+def _extent_of(one: Problem, extent: Extent, alike: bool) -> Extent:
+    """That of a problem which is alike to another."""
+    if not alike:
+        return extent
+    if one.name in own_problems():
+        return replace(extent, forms=False)
+    return replace(extent, forms=False, counted=False, compilers=extent.compilers[:1])
 
 
 def measure(
@@ -153,16 +158,11 @@ def measure(
     With `out` the report is written after each problem; what was measured before with all the same
     is read from there.  Of several problems those that cannot be measured are gaps; one alone
     raises.  alike: what each of these is so like that only generated kernels in double are measured
-    of it, with one compiler.
+    of it, by one compiler and not counted if it is not the benchmark's own.
     """
     about = _provenance(_compilers(extent), peers, extent)
     missing = dict(gaps)
-    extents = {
-        one.name: replace(extent, forms=False, counted=False, compilers=extent.compilers[:1])
-        if one.name in alike
-        else extent
-        for one in problems
-    }
+    extents = {one.name: _extent_of(one, extent, one.name in alike) for one in problems}
     kept: dict[str, Mapping[str, Any]] = {}
     for one in problems:
         part = _read(_file_of(one, out), _key(one, extents[one.name], about))
@@ -180,7 +180,7 @@ def measure(
                 measured = _measured(one, own, peers)
                 if one.name in alike:
                     of = alike[one.name]
-                    measured["missing"][f"other forms and compilers on {one.name}"] = (
+                    measured["missing"][f"other kernels, scalars and such on {one.name}"] = (
                         f"left out: its structure and algebra are those of {of}, which has them;"
                         f" bench precision {one.name} measures them"
                     )
@@ -219,10 +219,8 @@ def _file_of(one: Problem, out: Path | None) -> Path | None:
 
 
 def _typical_s(extent: Extent) -> float:
-    """What a problem takes on an ordinary machine; long runs up to half a minute for a million
-    steps are in it."""
     kind = "whole" if extent.forms else "quick" if extent.methods else "part"
-    return _TYPICAL_S[kind] + 4 * (_longest_s(extent.drift) - _LONGEST_RUN_S) * bool(extent.drift)
+    return _TYPICAL_S[kind] + _LONG_RUNS * extent.longest_run_s * bool(extent.drift)
 
 
 class Left:
@@ -316,7 +314,7 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
         missing[f"errors of the position on {one.name}"] = "its body has a fixed point"
     if ATTITUDE not in reference.end:
         missing[f"errors of the attitude on {one.name}"] = "its bodies have none"
-    if not extent.forms:
+    if extent.methods:
         missing["other kernels, representations, algebras and scalars"] = "left out if quick"
     elif isinstance(one.conformal, str):
         missing[f"{one.name} in conformal algebra"] = one.conformal
@@ -325,12 +323,14 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
     else:
         given = one.generated.cpp if one.generated else ""
         contestants += solvers.contestants(one.name, compilers, peers, extent, missing, given)
-    if len(compilers) > 1:
+    if extent.forms or len(compilers) > 1:
         ours = [c for c in contestants if c.is_ours and not c.label]
         uncounted = [replace(c, counted=None) for c in ours]
         first = [asdict(row) for row in _times(one, uncounted, replace(extent, rounds=0))]
         leading = leaders(first, one.name, one.norm)
-        contestants = begun_where_they_do_not_fail(contestants, first)
+        slow = too_slow_for_other_forms(contestants, first)
+        refused += [_left_out(c, one) for c in slow]
+        contestants = begun_where_they_do_not_fail([c for c in contestants if c not in slow], first)
         for compiler in compilers[1:]:
             contestants += _scenes(one, compiler, replace(extent, forms=False), leading)[0]
     next_is("time")
@@ -340,7 +340,7 @@ def _measured(one: Problem, extent: Extent, peers: Mapping[str, str]) -> dict[st
         missing[f"long runs of public solvers on {one.name}"] = (
             "its equations hold the time, and theirs are short runs, each from t = 0"
         )
-    long_runs = _long_runs(one, contestants, compilers[0], extent.drift)
+    long_runs = _long_runs(one, contestants, compilers[0], extent)
     next_is("end")
     del watch["end"]
     return {
@@ -373,15 +373,12 @@ def _formulation(one: Problem) -> str:
     return f"{GIVEN}: {one.generated.about}"
 
 
-def _longest_s(steps: int) -> float:
-    return max(_LONGEST_RUN_S, 0.1 * _LONGEST_RUN_S * steps / 1e6)
-
-
 def _long_runs(
-    one: Problem, contestants: Sequence[Contestant], compiler: str, steps: int
+    one: Problem, contestants: Sequence[Contestant], compiler: str, extent: Extent
 ) -> list[Drift]:
     """The generated kernels in double, and peers beside them on another core; what would take too
     long takes fewer steps."""
+    steps, longest_s = extent.drift, extent.longest_run_s
     if not steps:
         return []
     ours = [c for c in contestants if c.is_ours and not c.label and c.compiler == compiler]
@@ -389,7 +386,6 @@ def _long_runs(
         return []
     simulation = one.simulation
     step = step_of(simulation)
-    longest_s = _longest_s(steps)
     asked = solvers.long_runs(contestants, compiler, step, steps, SAMPLES, longest_s / 2)
     if one.generated is not None and one.generated.timed:
         asked = []
@@ -634,6 +630,34 @@ def begun_where_they_do_not_fail(
         else c
         for c in contestants
     ]
+
+
+def too_slow_for_other_forms(
+    contestants: Sequence[Contestant], first: Sequence[Mapping[str, Any]]
+) -> list[Contestant]:
+    """Other forms of methods whose generated kernels in double took longer at every setting than
+    may be: in quad each would take half a minute, to say no more than that."""
+    least: dict[str, float] = {}
+    for row in first:
+        if row["failure"] is None:
+            who = row["contestant"]
+            least[who] = min(least.get(who, float("inf")), row["best_us"])
+    return [
+        c
+        for c in contestants
+        if c.is_ours and c.label and least.get(c.name, 0.0) > 1e6 * c.longest_s
+    ]
+
+
+def _left_out(c: Contestant, one: Problem) -> Row:
+    form, setting = c.form, c.settings[0]
+    return Row(
+        one.name, c.name, "hamotor", c.label, c.compiler, form.kernels, form.representation,
+        form.algebra or one.algebra, form.scalar, setting["tolerance"] or setting["step"],
+        "tolerance" if setting["tolerance"] else "step",
+        failure="left out: generated kernels in double take longer than"
+        f" {1e3 * c.longest_s:g} ms at every setting",
+    )  # fmt: skip
 
 
 _FIRST_LOOK: Final = 0.7

@@ -32,10 +32,13 @@ is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why; so is what takes more than a minute or \
 ends its process, of which nothing finer is tried. Settings go from coarse to fine until two in a \
-row take longer than 15 ms (4 ms if quick), 40 times that where the solver is called from Python; \
-after one that takes so long to fail, the next is left out, after another one two, and so on. \
+row take longer than 15 ms (10 ms if quick) of processor time, 20 times that where the solver is \
+called from Python; after one that takes so long to fail, the next is left out, after another one \
+two, and so on. \
 Other kernels, representations and scalars begin with the longest step at which generated kernels \
-in double did not fail.
+in double did not fail, and are left out where these take longer than 15 ms at every setting. If \
+no scenes are named, one problem of each structure in each algebra has them; others that are not \
+the benchmark's own are not counted either, and compiled by one compiler.
 Scenes and solvers in C++ are compiled with -O3 -march=native, those that lead by each compiler, \
 of which the faster counts.
 Evaluations are those of rates or forques, and of a Taylor series its order. Operations are \
@@ -50,8 +53,9 @@ not more digits.
 Long runs take the scene's step; solvers with a tolerance take 1e-14 and their own steps for the \
 same time. Relative errors of what is conserved are taken over its size at the start; the \
 attitude, where the motion has a closed form, is held against that in quad. What would take \
-more than 10 s, of public solvers 5 s (for a million steps), takes fewer steps. p is the slope of \
-log error over log steps in the last two decades.
+more than 3 s (if their length is given by --drift 10 s, or 1 s for each million steps if that is \
+more), of public solvers half of that, takes fewer steps. p is the slope of log error over log \
+steps in the last two decades.
 Problems are measured one after the other; the date of each stands with its reference.
 A peer that is not installed is listed with the command that installs it; what a peer cannot \
 express is listed, too.
@@ -358,14 +362,14 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
         ladder[0]["contestant"] for ladder in ladders.values() if ladder[0]["family"] != "hamotor"
     ):
         if who not in arrived:
-            ax.errorbar([], [], linestyle="", label=f"{who}: not within {_COARSEST:g}")
+            ax.errorbar([], [], linestyle="", label=f"{who}: not within {_COARSEST:g} in time")
     for target in account["targets"]:
         ax.axhline(target, color="#eeeeee", linewidth=0.8, zorder=0)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_xlabel("time of the whole integration, µs (best of the runs; bars to the median)")
     ax.set_ylabel(f"error at the end: {norm}")
-    ax.set_title(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
+    figure.suptitle(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
     figure.legend(loc="outside right upper", fontsize=8, frameon=False)
     for file in files:
         with whole(file) as unfinished:

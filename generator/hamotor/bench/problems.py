@@ -7,6 +7,7 @@ import json
 import math
 import re
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, replace
 from decimal import Decimal
 from fractions import Fraction
@@ -271,7 +272,8 @@ def witnesses_of(one: Problem, said: Mapping[str, Any]) -> tuple[str, tuple[Witn
     found = []
     for method, scalar, tolerance in runs:
         say(f"{one.name}: {method} in {scalar} beside the reference")
-        description, row, setting = _end_of(simulation, method, scalar, tolerance)
+        library = simulation.compile(scalar=scalar, method=method).library
+        description, row, setting = _end_of(simulation, library, method, tolerance)
         found.append(Witness(method, scalar, setting, _apart(description, row, said)))
         if not found[-1].apart < _LARGEST_DOUBT:
             raise UsageError(f"{one.name}: its reference is contradicted: {found[-1]}")
@@ -339,13 +341,21 @@ def _computed(simulation: Simulation) -> Reference:
     file = default_cache() / "references" / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
     kept = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else {}
     method, scalar, tolerance = runs[0]
-    description = simulation.compile(scalar=scalar, method=method).description
+    by_scalar: dict[str, list[str]] = {}
+    for m, s, _ in runs:
+        by_scalar.setdefault(s, []).append(m)
+
+    def compiled(each: str) -> SceneLibrary:
+        # Nobody times these.
+        return simulation.compile(scalar=each, method=by_scalar[each], extra_flags=("-O1",)).library
+
     if not kept:
-        columns = description.state_columns()
-        row, witnesses = _end_of(simulation, method, scalar, tolerance)[1], []
-        together = [m for m, s, _ in runs if s == runs[-1][1]]
+        with ThreadPoolExecutor(2) as pool:
+            libraries = dict(zip(by_scalar, pool.map(compiled, by_scalar), strict=True))
+        columns = libraries[scalar].description.state_columns()
+        row, witnesses = _end_of(simulation, libraries[scalar], method, tolerance)[1], []
         for other in runs[1:]:
-            _, there, setting = _end_of(simulation, *other, compiled_with=together)
+            _, there, setting = _end_of(simulation, libraries[other[1]], other[0], other[2])
             apart = float(max(abs(Fraction(row[c]) - Fraction(there[c])) for c in columns))
             witnesses.append(asdict(Witness(other[0], other[1], setting, apart)))
         kept = {"row": row, "witnesses": witnesses}
@@ -359,7 +369,7 @@ def _computed(simulation: Simulation) -> Reference:
                 f"{simulation.name}: {source} and another run differ by {witness}, so that there is"
                 " no reference. The motion is chaotic or not smooth: end it earlier."
             )
-    end = endpoint.of_row(description, [np.longdouble(x) for x in kept["row"]])
+    end = endpoint.of_row(compiled(scalar).description, [np.longdouble(x) for x in kept["row"]])
     return Reference(end, source, in_words(found), found)
 
 
@@ -375,11 +385,9 @@ def _setting(simulation: Simulation, tolerance: float) -> str:
 
 
 def _end_of(
-    simulation: Simulation, method: str, scalar: str, tolerance: float,
-    compiled_with: Sequence[str] = (),
-) -> tuple[Description, list[str], str]:  # fmt: skip
+    simulation: Simulation, library: SceneLibrary, method: str, tolerance: float
+) -> tuple[Description, list[str], str]:
     """What the row at the end holds, the row in decimals with all digits, and how it was made."""
-    library = simulation.compile(scalar=scalar, method=compiled_with or method).library
     parts = 16 if tolerance else _steps(simulation)  # an answer to Ctrl-C now and then
     step = Fraction(simulation.end) / parts
     with library.start(

@@ -67,7 +67,7 @@ _GIVEN: Final = Form(kernels="", representation=GIVEN)
 _ODEINT: Final = ("odeint rkf78", "odeint dopri5", "odeint Bulirsch-Stoer")
 _SUNDIALS: Final = ("CVODE Adams", "ARKODE ERK 5", "ARKODE ERK 8")
 _INCLUDES: Final = ("/usr/include", "/usr/local/include", "/opt/homebrew/include")
-_PYTHON_IS_SLOWER: Final = 40
+_PYTHON_IS_SLOWER: Final = 20
 """How many times as long as others those may take that are called from Python."""
 _TIGHT: Final = 1e-14
 SILENT_S: Final = 60.0
@@ -297,7 +297,7 @@ def contestants(
             add("heyoka", "heyoka", "heyoka", options, tolerances(extent, 1e-16), label=label)
     slow = _PYTHON_IS_SLOWER * extent.longest_s
     if "scipy" in peers:
-        coarse = tolerances(extent, 3e-14)
+        coarse = tolerances(extent, 3e-14)[::2]
         for method in ("DOP853", "LSODA"):
             add(f"SciPy {method}", "SciPy", "scipy", {"method": method}, coarse, slow)
     if equations:

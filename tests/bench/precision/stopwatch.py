@@ -1,10 +1,11 @@
 """Times contestants in one process: `-m tests.bench.precision.stopwatch JOB` writes rows of JSON.
 
-A contestant is a list of settings from coarse to fine.  Each setting runs once or, if short, three
-times, until two in a row take longer than the contestant may; after each that fails and takes so
-long, one more of the next is left out.  Who asked is told how each ended, and answers with those
-that are worth more; then rounds go over these of all contestants, so that what else runs on the
-machine disturbs all alike.  Runs in the peers' environment and needs nothing of Hamotor.
+A contestant is a list of settings from coarse to fine.  Each setting runs once or, if short or
+disturbed, three times, until two in a row take longer than the contestant may; after each that
+fails and takes so long, one more of the next is left out.  Who asked is told how each ended, and
+answers with those that are worth more; then rounds go over these of all contestants, so that what
+else runs on the machine disturbs all alike.  Runs in the peers' environment and needs nothing of
+Hamotor.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ _BATCH_S = 3e-4
 """Shorter runs are repeated until they take this long."""
 _LARGEST_BATCH = 10
 _SHORT_S = 1e-3
+_DISTURBED = 1.3
 
 Worth = Callable[[], Iterable[tuple[int, int]]]
 """Contestants and settings that are worth more than one run."""
@@ -84,6 +86,16 @@ class Entry:
         self.seconds += self.last.seconds
         self.processor_s = min(self.processor_s, *self.last.processor)
 
+    @property
+    def needs_s(self) -> float:
+        """What it takes, however busy the machine is."""
+        return min(*self.seconds, self.processor_s)
+
+    @property
+    def was_disturbed(self) -> bool:
+        """Whether it had to wait for the processor in every run."""
+        return min(self.seconds) > _DISTURBED * self.processor_s
+
     def row(self) -> dict[str, Any]:
         """What is written of it."""
         assert self.last is not None
@@ -121,9 +133,9 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
             try:
                 entry = Entry(at, _timed(job, contestant, setting, problem))
                 entry.run()
-                if 1 < min(entry.seconds) / contestant["longest_s"] < 2:
-                    entry.run()  # it may have been disturbed
-                while len(entry.seconds) < 3 and sum(entry.seconds) < _SHORT_S:
+                while len(entry.seconds) < 3 and (
+                    sum(entry.seconds) < _SHORT_S or entry.was_disturbed
+                ):
                     entry.run()
             except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
                 yield {**at, "failure": str(problem_met)}
@@ -132,7 +144,7 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
                     left_out = failed
                 continue
             entries.append(entry)
-            slow = slow + 1 if min(entry.seconds) > contestant["longest_s"] else 0
+            slow = slow + 1 if entry.needs_s > contestant["longest_s"] else 0
             if slow == 2:
                 break
     for entry in entries:
