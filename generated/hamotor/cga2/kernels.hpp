@@ -728,7 +728,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 30 mul, 13 add (9 fused), 4 div, 1 abs, 1 length, 2 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(
       m.s > S(0), S(1) + m.s,
       dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
@@ -755,7 +755,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 21 mul, 9 add (6 fused), 4 div, 1 abs, 1 length, 2 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i) / (S(1) - m.s));
   const S radius = scalar::length(shifted, m.e012i);
@@ -778,7 +778,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 6 mul, 2 add, 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
@@ -854,7 +854,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 29 mul, 13 add (10 fused), 2 div, 1 max_abs, 1 scaling, 1 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
   const S shifted = select(
       m.s > S(0), S(1) + m.s,
       dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /
@@ -876,7 +876,7 @@ template <class S>
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Cost: 33 mul, 18 add (15 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Versor<S> normalize(const Versor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Versor<S> normalize(const Versor<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12, m.e02, m.e1i, -m.e01, m.e2i);
   const S square = dot(m.s, m.s, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2),
                        dot(m.e01, m.e1i, m.e02, m.e2i));
@@ -900,7 +900,7 @@ template <class S>
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Cost: 24 mul, 12 add (10 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Similarity<S> normalize(const Similarity<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Similarity<S> normalize(const Similarity<S>& m) noexcept {
   const S q_e012i = dot(m.e012i, m.s, -m.e0i, m.e12);
   const S square = dot(m.s, m.s, m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i);
   const S omega = q_e012i * q_e012i;
@@ -922,7 +922,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 14 mul, 1 add (1 fused), 1 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;

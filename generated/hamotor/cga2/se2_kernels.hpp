@@ -129,7 +129,7 @@ template <class S>
 /// Cost: 8 mul, 2 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
 /// double_word_sqrt_parts, 1 max_abs, 1 scaling, 2 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e1i = S(0.5) * -w.v1;
   const S b_e2i = S(0.5) * -w.v2;
@@ -153,7 +153,7 @@ template <class S>
 /// Cost: 14 mul, 1 add, 3 div, 1 atan2, 1 compensated_dot_parts, 2 max_abs, 1 pi, 1 scaling, 9
 /// select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_parts(r_e12, r_e12);
@@ -177,7 +177,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 14 mul, 1 add (1 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e1i = S(0.5) * -w.v1;
   const S b_e2i = S(0.5) * -w.v2;
@@ -199,7 +199,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 14 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 4 select.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);

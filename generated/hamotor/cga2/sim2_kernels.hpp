@@ -208,7 +208,8 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 24 mul, 9 add (7 fused), 2 div, 1 max_abs, 1 scaling, 1 select.
 template <class S>
-[[nodiscard]] constexpr sim2::Rate<S> cayley_inverse(const Similarity<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr sim2::Rate<S> cayley_inverse(
+    const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i) / (S(1) - m.s));
   const auto scaling = scalar::scaling(scalar::max_abs(shifted, m.e012i));

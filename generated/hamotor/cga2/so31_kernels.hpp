@@ -297,7 +297,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 35 mul, 13 add (10 fused), 2 div, 1 max_abs, 1 scaling, 1 select.
 template <class S>
-[[nodiscard]] constexpr so31::Rate<S> cayley_inverse(const Versor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so31::Rate<S> cayley_inverse(const Versor<S>& m) noexcept {
   const S shifted = select(
       m.s > S(0), S(1) + m.s,
       dot(m.e12, m.e12, -m.e0i, m.e0i, -m.e012i, m.e012i, S(2), dot(m.e01, m.e1i, m.e02, m.e2i)) /

@@ -1980,7 +1980,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 5 mul, 3 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Vector<S>& v) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Vector<S>& v) noexcept {
   return scalar::sqrt(scalar::abs(dot(v.e1, v.e1, v.e2, v.e2, v.e3, v.e3, S(2), -v.e0 * v.ei)));
 }
 
@@ -1988,7 +1988,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 8 mul, 6 add (5 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Bivector<S>& b) noexcept {
   return scalar::sqrt(scalar::abs(dot(b.e23, b.e23, b.e31, b.e31, b.e12, b.e12, -b.e0i, b.e0i, S(2),
                                       dot(b.e01, b.e1i, b.e02, b.e2i, b.e03, b.e3i))));
 }
@@ -1997,7 +1997,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 8 mul, 6 add (5 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Trivector<S>& t) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Trivector<S>& t) noexcept {
   return scalar::sqrt(
       scalar::abs(dot(t.e123, t.e123, -t.e01i, t.e01i, -t.e02i, t.e02i, -t.e03i, t.e03i, S(2),
                       dot(-t.e023, t.e23i, -t.e031, t.e31i, -t.e012, t.e12i))));
@@ -2141,7 +2141,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 22 mul, 7 add (5 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S shifted =
       select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
@@ -2164,7 +2164,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 54 mul, 29 add (25 fused), 4 div, 1 abs, 2 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Similarity<S> sqrt(const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i,
                                m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) /
@@ -2356,7 +2356,7 @@ template <class S>
 /// Cost: 22 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
 /// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const Line<S>& l) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Line<S>& l) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(l.e12, -l.e31, l.e23));
   const S w_e12 = w_scaling.in * l.e12;
   const S w_e13 = w_scaling.in * -l.e31;
@@ -2392,7 +2392,7 @@ template <class S>
 /// Cost: 46 mul, 12 add (7 fused), 5 div, 1 atan2, 4 compensated_dot_pair, 2 compensated_dot_parts,
 /// 4 double_word_product, 1 double_word_reciprocal, 2 max_abs, 1 pi, 2 scaling, 17 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Line<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Line<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -2778,7 +2778,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 34 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;
@@ -2809,7 +2809,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 12 mul, 3 add (2 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.s, r.e12, -r.e31, r.e23));
   const S r_s = r_scaling.in * r.s;
   const S r_e12 = r_scaling.in * r.e12;

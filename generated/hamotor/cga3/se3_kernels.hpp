@@ -214,7 +214,7 @@ template <class S>
 /// Cost: 28 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
 /// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -256,7 +256,7 @@ template <class S>
 /// Cost: 52 mul, 12 add (7 fused), 5 div, 1 atan2, 4 compensated_dot_pair, 2 compensated_dot_parts,
 /// 4 double_word_product, 1 double_word_reciprocal, 2 max_abs, 1 pi, 2 scaling, 17 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -318,7 +318,7 @@ template <class S>
 /// Cost: 43 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -361,7 +361,7 @@ template <class S>
 /// Cost: 32 mul, 2 add, 2 div, 4 compensated_dot, 2 compensated_dot_pair, 1 double_word_ratio, 2
 /// max_abs, 2 scaling, 6 select.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;

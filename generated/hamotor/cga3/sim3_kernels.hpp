@@ -374,7 +374,8 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 48 mul, 26 add (23 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr sim3::Rate<S> cayley_inverse(const Similarity<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr sim3::Rate<S> cayley_inverse(
+    const Similarity<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
                            dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12, -m.e0i, m.e0i, -m.e023i,
                                m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i) /

@@ -459,7 +459,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 3 mul, 2 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Vector<S>& v) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Vector<S>& v) noexcept {
   return scalar::sqrt(scalar::abs(dot(v.e1, v.e1, v.e2, v.e2, v.e3, v.e3)));
 }
 
@@ -467,7 +467,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 3 mul, 2 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Bivector<S>& b) noexcept {
   return scalar::sqrt(scalar::abs(dot(b.e23, b.e23, b.e31, b.e31, b.e12, b.e12)));
 }
 
@@ -499,7 +499,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 8 mul, 4 add (2 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
   const S shifted =
       select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
   const S root = scalar::sqrt(S(2) * shifted);
@@ -513,7 +513,7 @@ template <class S>
 /// Cost: 6 mul, 1 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
 /// double_word_sqrt_parts, 1 max_abs, 1 scaling, 1 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> exp(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp(const Bivector<S>& b) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(b.e12, -b.e31, b.e23));
   const S w_e12 = w_scaling.in * b.e12;
   const S w_e13 = w_scaling.in * -b.e31;
@@ -533,7 +533,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 6 mul, 2 add (2 fused), 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> exp_lean(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp_lean(const Bivector<S>& b) noexcept {
   const S square = dot(b.e12, b.e12, b.e31, b.e31, b.e23, b.e23);
   const S length = scalar::sqrt(square);
   const S cosine = scalar::cos(length);
@@ -548,7 +548,7 @@ template <class S>
 /// Cost: 7 mul, 1 add, 2 div, 1 atan2, 1 compensated_dot_parts, 1 max_abs, 1 pi, 1 scaling, 7
 /// select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;
@@ -571,7 +571,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 4 mul, 1 add (1 fused), 1 div, 1 acos, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log_lean(const Rotor<S>& r) noexcept {
   const S square = scalar::fma(-r.s, r.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(r.s) / scalar::sqrt(square), S(1));
   return {.e23 = stretch * r.e23, .e31 = stretch * r.e31, .e12 = stretch * r.e12};
@@ -582,7 +582,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 13 mul, 3 add (2 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> cayley(const Bivector<S>& b) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(S(1), b.e12, -b.e31, b.e23));
   const S r_e12 = r_scaling.in * b.e12;
   const S r_e13 = r_scaling.in * -b.e31;
@@ -622,7 +622,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 9 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 2 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;
@@ -641,7 +641,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 6 mul, 4 add (2 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse_lean(const Rotor<S>& r) noexcept {
   const S shifted =
       select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
   const S linear = S(1) / shifted;
@@ -653,7 +653,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 12 mul, 3 add (2 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.s, r.e12, -r.e31, r.e23));
   const S r_s = r_scaling.in * r.s;
   const S r_e12 = r_scaling.in * r.e12;
@@ -673,7 +673,7 @@ template <class S>
 /// neither overflow nor vanish.
 /// Cost: 8 mul, 3 add (2 fused), 1 div, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize_lean(const Rotor<S>& r) noexcept {
   const S square = dot(r.s, r.s, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12);
   const S root = scalar::sqrt(square);
   const S factor = S(1) / root;

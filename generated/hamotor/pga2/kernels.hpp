@@ -490,7 +490,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 2 mul, 1 add (1 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Line<S>& l) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Line<S>& l) noexcept {
   return scalar::sqrt(scalar::abs(dot(l.e1, l.e1, l.e2, l.e2)));
 }
 
@@ -498,7 +498,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 1 mul, 0 add, 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Bivector<S>& b) noexcept {
   return scalar::sqrt(scalar::abs(b.e12 * b.e12));
 }
 
@@ -530,7 +530,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 6 mul, 2 add, 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
   const S factor = S(1) / root;
@@ -544,7 +544,7 @@ template <class S>
 /// Cost: 5 mul, 2 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
 /// double_word_sqrt_parts, 1 max_abs, 1 scaling, 2 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(b.e12));
   const S w_e12 = w_scaling.in * b.e12;
   const auto squares = scalar::compensated_dot_parts(w_e12, w_e12);
@@ -563,7 +563,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 4 mul, 0 add, 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp_lean(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp_lean(const Bivector<S>& b) noexcept {
   const S square = b.e12 * b.e12;
   const S length = scalar::sqrt(square);
   const S cosine = scalar::cos(length);
@@ -579,7 +579,7 @@ template <class S>
 /// Cost: 11 mul, 1 add, 3 div, 1 atan2, 1 compensated_dot_parts, 2 max_abs, 1 pi, 1 scaling, 9
 /// select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_parts(r_e12, r_e12);
@@ -604,7 +604,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 4 mul, 1 add (1 fused), 1 div, 1 acos, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log_lean(const Motor<S>& m) noexcept {
   const S square = scalar::fma(-m.s, m.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
   return {.e12 = stretch * m.e12, .e01 = stretch * m.e01, .e02 = stretch * m.e02};
@@ -615,7 +615,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 11 mul, 1 add (1 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(S(1), b.e12));
   const S r_e12 = r_scaling.in * b.e12;
   const auto total = scalar::compensated_dot_pair(r_scaling.in, r_scaling.in, r_e12, r_e12);
@@ -651,7 +651,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 11 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 4 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);
@@ -670,7 +670,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 4 mul, 2 add, 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
   const S linear = S(1) / shifted;
   return {.e12 = linear * m.e12, .e01 = linear * m.e01, .e02 = linear * m.e02};
@@ -681,7 +681,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 14 mul, 1 add (1 fused), 1 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;
@@ -704,7 +704,7 @@ template <class S>
 /// neither overflow nor vanish.
 /// Cost: 6 mul, 1 add (1 fused), 1 div, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize_lean(const Motor<S>& m) noexcept {
   const S square = dot(m.s, m.s, m.e12, m.e12);
   const S root = scalar::sqrt(square);
   const S factor = S(1) / root;

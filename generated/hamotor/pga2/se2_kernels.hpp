@@ -129,7 +129,7 @@ template <class S>
 /// Cost: 8 mul, 2 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
 /// double_word_sqrt_parts, 1 max_abs, 1 scaling, 2 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -153,7 +153,7 @@ template <class S>
 /// Cost: 14 mul, 1 add, 3 div, 1 atan2, 1 compensated_dot_parts, 2 max_abs, 1 pi, 1 scaling, 9
 /// select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_parts(r_e12, r_e12);
@@ -177,7 +177,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 14 mul, 1 add (1 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se2::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -199,7 +199,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 14 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 4 select.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
   const S r_e12 = r_scaling.in * m.e12;
   const auto squares = scalar::compensated_dot_pair(r_e12, r_e12);
@@ -218,7 +218,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 5 mul, 0 add, 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp_lean(const se2::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp_lean(const se2::Rate<S>& w) noexcept {
   const S square = w.w12 * w.w12;
   const S length = scalar::sqrt(square);
   const S angle = S(0.5) * length;
@@ -233,7 +233,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 5 mul, 1 add (1 fused), 1 div, 1 acos, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> log_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> log_lean(const Motor<S>& m) noexcept {
   const S square = scalar::fma(-m.s, m.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
   const S scaled = S(2) * stretch;
@@ -266,7 +266,8 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 7 mul, 2 add, 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr se2::Rate<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> cayley_inverse_lean(
+    const Motor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s, m.e12 * m.e12 / (S(1) - m.s));
   const S linear = S(1) / shifted;
   return {.w12 = S(-2) * (linear * m.e12),

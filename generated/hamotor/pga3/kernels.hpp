@@ -1302,7 +1302,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 3 mul, 2 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Plane<S>& p) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Plane<S>& p) noexcept {
   return scalar::sqrt(scalar::abs(dot(p.e1, p.e1, p.e2, p.e2, p.e3, p.e3)));
 }
 
@@ -1310,7 +1310,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 3 mul, 2 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Bivector<S>& b) noexcept {
   return scalar::sqrt(scalar::abs(dot(b.e23, b.e23, b.e31, b.e31, b.e12, b.e12)));
 }
 
@@ -1318,7 +1318,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 1 mul, 0 add, 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Trivector<S>& t) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Trivector<S>& t) noexcept {
   return scalar::sqrt(scalar::abs(t.e123 * t.e123));
 }
 
@@ -1404,7 +1404,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 22 mul, 7 add (5 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S shifted =
       select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
   const S root = scalar::sqrt(S(2) * shifted);
@@ -1427,7 +1427,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 8 mul, 4 add (2 fused), 2 div, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
   const S shifted =
       select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
   const S root = scalar::sqrt(S(2) * shifted);
@@ -1442,7 +1442,7 @@ template <class S>
 /// Cost: 22 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
 /// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Bivector<S>& b) noexcept {
   const auto w_scaling = scalar::scaling(scalar::max_abs(b.e12, -b.e31, b.e23));
   const S w_e12 = w_scaling.in * b.e12;
   const S w_e13 = w_scaling.in * -b.e31;
@@ -1477,7 +1477,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 17 mul, 8 add (7 fused), 2 div, 1 cos, 2 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp_lean(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp_lean(const Bivector<S>& b) noexcept {
   const S square = dot(b.e12, b.e12, b.e31, b.e31, b.e23, b.e23);
   const S length = scalar::sqrt(square);
   const S cosine = scalar::cos(length);
@@ -1501,7 +1501,7 @@ template <class S>
 /// Cost: 46 mul, 12 add (7 fused), 5 div, 1 atan2, 4 compensated_dot_pair, 2 compensated_dot_parts,
 /// 4 double_word_product, 1 double_word_reciprocal, 2 max_abs, 1 pi, 2 scaling, 17 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -1560,7 +1560,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 14 mul, 5 add (5 fused), 1 div, 1 acos, 2 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> log_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> log_lean(const Motor<S>& m) noexcept {
   const S square = scalar::fma(-m.s, m.s, S(1));
   const S inverse = S(1) / square;
   const S stretch = select(square > S(0), scalar::acos(m.s) * scalar::sqrt(inverse), S(1));
@@ -1579,7 +1579,7 @@ template <class S>
 /// Cost: 37 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const Bivector<S>& b) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(S(1), b.e12, -b.e31, b.e23));
   const S r_e12 = r_scaling.in * b.e12;
   const S r_e13 = r_scaling.in * -b.e31;
@@ -1639,7 +1639,7 @@ template <class S>
 /// Cost: 26 mul, 2 add, 2 div, 4 compensated_dot, 2 compensated_dot_pair, 1 double_word_ratio, 2
 /// max_abs, 2 scaling, 6 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -1677,7 +1677,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 16 mul, 7 add (5 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
   const S shifted =
       select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
   const S linear = S(1) / shifted;
@@ -1695,7 +1695,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 34 mul, 10 add (8 fused), 2 div, 2 max_abs, 2 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.s, m.e12, -m.e31, m.e23));
   const S r_s = r_scaling.in * m.s;
   const S r_e12 = r_scaling.in * m.e12;
@@ -1726,7 +1726,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm, unless M has no rotor part.
 /// Cost: 12 mul, 3 add (2 fused), 1 div, 1 max_abs, 1 scaling, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.s, r.e12, -r.e31, r.e23));
   const S r_s = r_scaling.in * r.s;
   const S r_e12 = r_scaling.in * r.e12;
@@ -1746,7 +1746,7 @@ template <class S>
 /// neither overflow nor vanish.
 /// Cost: 21 mul, 10 add (8 fused), 2 div, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> normalize_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> normalize_lean(const Motor<S>& m) noexcept {
   const S q_e0123 = dot(m.e0123, m.s, -m.e01, m.e23, -m.e02, m.e31, -m.e03, m.e12);
   const S square = dot(m.s, m.s, m.e23, m.e23, m.e31, m.e31, m.e12, m.e12);
   const S root = scalar::sqrt(square);
@@ -1768,7 +1768,7 @@ template <class S>
 /// neither overflow nor vanish.
 /// Cost: 8 mul, 3 add (2 fused), 1 div, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize_lean(const Rotor<S>& r) noexcept {
   const S square = dot(r.s, r.s, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12);
   const S root = scalar::sqrt(square);
   const S factor = S(1) / root;

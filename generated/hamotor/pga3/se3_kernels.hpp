@@ -214,7 +214,7 @@ template <class S>
 /// Cost: 28 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
 /// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se3::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -256,7 +256,7 @@ template <class S>
 /// Cost: 52 mul, 12 add (7 fused), 5 div, 1 atan2, 4 compensated_dot_pair, 2 compensated_dot_parts,
 /// 4 double_word_product, 1 double_word_reciprocal, 2 max_abs, 1 pi, 2 scaling, 17 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> log(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -318,7 +318,7 @@ template <class S>
 /// Cost: 43 mul, 9 add (8 fused), 1 div, 2 compensated_dot_pair, 1 double_word_ratio, 2 max_abs, 2
 /// scaling.
 template <class S>
-[[nodiscard]] constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> cayley(const se3::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.v1;
   const S b_e02 = S(0.5) * -w.v2;
   const S b_e12 = S(0.5) * -w.w12;
@@ -361,7 +361,7 @@ template <class S>
 /// Cost: 32 mul, 2 add, 2 div, 4 compensated_dot, 2 compensated_dot_pair, 1 double_word_ratio, 2
 /// max_abs, 2 scaling, 6 select.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12, -m.e31, m.e23));
   const S r_e12 = r_scaling.in * m.e12;
   const S r_e13 = r_scaling.in * -m.e31;
@@ -402,7 +402,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 20 mul, 8 add (8 fused), 2 div, 1 cos, 2 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> exp_lean(const se3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp_lean(const se3::Rate<S>& w) noexcept {
   const S square = dot(w.w12, w.w12, w.w31, w.w31, w.w23, w.w23);
   const S length = scalar::sqrt(square);
   const S angle = S(0.5) * length;
@@ -426,7 +426,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 16 mul, 5 add (5 fused), 1 div, 1 acos, 2 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> log_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> log_lean(const Motor<S>& m) noexcept {
   const S square = scalar::fma(-m.s, m.s, S(1));
   const S inverse = S(1) / square;
   const S stretch = select(square > S(0), scalar::acos(m.s) * scalar::sqrt(inverse), S(1));
@@ -476,7 +476,8 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 22 mul, 7 add (5 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr se3::Rate<S> cayley_inverse_lean(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> cayley_inverse_lean(
+    const Motor<S>& m) noexcept {
   const S shifted =
       select(m.s > S(0), S(1) + m.s, dot(m.e23, m.e23, m.e31, m.e31, m.e12, m.e12) / (S(1) - m.s));
   const S linear = S(1) / shifted;

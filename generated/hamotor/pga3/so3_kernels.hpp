@@ -142,7 +142,7 @@ template <class S>
 /// Cost: 9 mul, 1 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
 /// double_word_sqrt_parts, 1 max_abs, 1 scaling, 1 select, 1 sin_cos.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> exp(const so3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp(const so3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -166,7 +166,7 @@ template <class S>
 /// Cost: 10 mul, 1 add, 2 div, 1 atan2, 1 compensated_dot_parts, 1 max_abs, 1 pi, 1 scaling, 7
 /// select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr so3::Rate<S> log(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> log(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;
@@ -189,7 +189,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm.
 /// Cost: 16 mul, 3 add (2 fused), 1 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> cayley(const so3::Rate<S>& w) noexcept {
   const S b_e12 = S(0.5) * -w.w12;
   const S b_e13 = S(0.5) * w.w31;
   const S b_e23 = S(0.5) * -w.w23;
@@ -215,7 +215,7 @@ template <class S>
 /// which no finite bivector reaches.
 /// Cost: 12 mul, 2 add, 2 div, 1 compensated_dot_pair, 1 max_abs, 1 scaling, 2 select.
 template <class S>
-[[nodiscard]] constexpr so3::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const auto r_scaling = scalar::scaling(scalar::max_abs(r.e12, -r.e31, r.e23));
   const S r_e12 = r_scaling.in * r.e12;
   const S r_e13 = r_scaling.in * -r.e31;
@@ -234,7 +234,7 @@ template <class S>
 /// grows with the angle.  Squares of coordinates must not overflow.
 /// Cost: 7 mul, 2 add (2 fused), 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> exp_lean(const so3::Rate<S>& w) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp_lean(const so3::Rate<S>& w) noexcept {
   const S square = dot(w.w12, w.w12, w.w31, w.w31, w.w23, w.w23);
   const S length = scalar::sqrt(square);
   const S angle = S(0.5) * length;
@@ -249,7 +249,7 @@ template <class S>
 /// grows like 1/(π − θ)²: 80 at 3, 3e4 at 3.14159.  At −1, which has no direction, 0.
 /// Cost: 5 mul, 1 add (1 fused), 1 div, 1 acos, 1 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr so3::Rate<S> log_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> log_lean(const Rotor<S>& r) noexcept {
   const S square = scalar::fma(-r.s, r.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(r.s) / scalar::sqrt(square), S(1));
   const S scaled = S(2) * stretch;
@@ -282,7 +282,8 @@ template <class S>
 /// grows like 1/(π − θ)²: 30 at 3, 2e4 at 3.14159.  Not finite at M = −1.
 /// Cost: 9 mul, 4 add (2 fused), 2 div, 1 select.
 template <class S>
-[[nodiscard]] constexpr so3::Rate<S> cayley_inverse_lean(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so3::Rate<S> cayley_inverse_lean(
+    const Rotor<S>& r) noexcept {
   const S shifted =
       select(r.s > S(0), S(1) + r.s, dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12) / (S(1) - r.s));
   const S linear = S(1) / shifted;

@@ -1045,7 +1045,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 61 mul, 35 add (22 fused), 4 div, 2 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> sqrt(const Motor<S>& m) noexcept {
   const S plus_0 = m.e12 - m.e34;
   const S plus_1 = m.e13 + m.e24;
   const S plus_2 = m.e14 - m.e23;
@@ -1099,7 +1099,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 33 mul, 23 add (10 fused), 4 div, 2 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
   const S plus_0 = r.e12 - r.e34;
   const S plus_1 = r.e13 + r.e24;
   const S plus_2 = r.e14 - r.e23;
@@ -1337,7 +1337,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 50 mul, 35 add (22 fused), 4 div, 2 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Motor<S>& m) noexcept {
   const S plus_0 = m.e12 - m.e34;
   const S plus_1 = m.e13 + m.e24;
   const S plus_2 = m.e14 - m.e23;
@@ -1436,7 +1436,7 @@ template <class S>
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Cost: 33 mul, 20 add (17 fused), 2 div, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const S q_e1234 = dot(r.e1234, r.s, -r.e12, r.e34, r.e13, r.e24, -r.e14, r.e23);
   const S square = dot(r.s, r.s, r.e12, r.e12, r.e13, r.e13, r.e14, r.e14, r.e23, r.e23, r.e24,
                        r.e24, r.e34, r.e34, r.e1234, r.e1234);

@@ -504,7 +504,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 60 mul, 35 add (22 fused), 4 div, 2 select.
 template <class S>
-[[nodiscard]] constexpr se4::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr se4::Rate<S> cayley_inverse(const Motor<S>& m) noexcept {
   const S plus_0 = m.e12 - m.e34;
   const S plus_1 = m.e13 + m.e24;
   const S plus_2 = m.e14 - m.e23;

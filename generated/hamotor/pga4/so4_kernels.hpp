@@ -364,7 +364,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 32 mul, 23 add (10 fused), 4 div, 2 select.
 template <class S>
-[[nodiscard]] constexpr so4::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so4::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const S plus_0 = r.e12 - r.e34;
   const S plus_1 = r.e13 + r.e24;
   const S plus_2 = r.e14 - r.e23;

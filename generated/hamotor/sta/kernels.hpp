@@ -490,7 +490,7 @@ template <class S>
 /// √|<a ~a>₀|.
 /// Cost: 4 mul, 3 add (2 fused), 1 abs, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr S norm(const Vector<S>& v) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S norm(const Vector<S>& v) noexcept {
   return scalar::sqrt(scalar::abs(dot(v.e0, v.e0, -v.e1, v.e1, -v.e2, v.e2, -v.e3, v.e3)));
 }
 
@@ -534,7 +534,7 @@ template <class S>
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
 /// Cost: 31 mul, 15 add (11 fused), 4 div, 1 abs, 1 length, 2 select, 1 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> sqrt(const Rotor<S>& r) noexcept {
   const S shifted = select(r.s > S(0), S(1) + r.s,
                            dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12, -r.e10, r.e10, -r.e20,
                                r.e20, -r.e30, r.e30, -r.e0123, r.e0123) /
@@ -628,7 +628,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 30 mul, 15 add (12 fused), 2 div, 1 max_abs, 1 scaling, 1 select.
 template <class S>
-[[nodiscard]] constexpr Bivector<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const S shifted = select(r.s > S(0), S(1) + r.s,
                            dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12, -r.e10, r.e10, -r.e20,
                                r.e20, -r.e30, r.e30, -r.e0123, r.e0123) /
@@ -650,7 +650,7 @@ template <class S>
 /// M (~M M)^(−1/2): the unit versor nearest to M.
 /// Cost: 34 mul, 20 add (17 fused), 3 div, 1 abs, 1 select, 2 sqrt.
 template <class S>
-[[nodiscard]] constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> normalize(const Rotor<S>& r) noexcept {
   const S q_e0123 = dot(r.e0123, r.s, r.e10, r.e23, r.e20, r.e31, r.e12, r.e30);
   const S square = dot(r.s, r.s, r.e23, r.e23, r.e31, r.e31, r.e12, r.e12, -r.e10, r.e10, -r.e20,
                        r.e20, -r.e30, r.e30, -r.e0123, r.e0123);

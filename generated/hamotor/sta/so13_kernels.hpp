@@ -314,7 +314,7 @@ template <class S>
 /// Infinite at M = −1, which no finite bivector reaches.
 /// Cost: 36 mul, 15 add (12 fused), 2 div, 1 max_abs, 1 scaling, 1 select.
 template <class S>
-[[nodiscard]] constexpr so13::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr so13::Rate<S> cayley_inverse(const Rotor<S>& r) noexcept {
   const S shifted = select(r.s > S(0), S(1) + r.s,
                            dot(r.e23, r.e23, r.e31, r.e31, r.e12, r.e12, -r.e10, r.e10, -r.e20,
                                r.e20, -r.e30, r.e30, -r.e0123, r.e0123) /

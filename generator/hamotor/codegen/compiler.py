@@ -21,7 +21,7 @@ from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import library
-from hamotor.codegen.program import Call
+from hamotor.codegen.program import Call, Program
 from hamotor.codegen.spec import AlgebraSpec
 
 if TYPE_CHECKING:
@@ -31,8 +31,9 @@ TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
 INLINED_OPERATIONS = 128
 """Kernels of at most so many additions, multiplications and divisions are always inlined: for
-them the way of a result through memory costs more than the arithmetic.  Kernels that call
-functions of the runtime are longer than their count."""
+them the way of a result through memory costs more than the arithmetic."""
+INLINED_WITH_CALLS = 320
+"""exp, log, normalize and their like may come to so many with the functions that they call."""
 PACKED = "if constexpr (lanes::packed<S>) {"
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
@@ -200,7 +201,10 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
         kept, possible = kernel.pairs
         sparsity = f"{kept} of {possible} pairs of components"
     cost = kernel.program.cost
-    inlined = cost.total <= INLINED_OPERATIONS and not cost.calls
+    whole = cost.total + _operations_of_calls(kernel.program)
+    inlined = cost.total <= INLINED_OPERATIONS and (
+        not cost.calls or (kernel.meaning is None and whole <= INLINED_WITH_CALLS)
+    )
     return {
         "title": kernel_title(kernel),
         "law": kernel.law,
@@ -211,6 +215,21 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
         "signature": cpp.signature_text(kernel.name, kernel.program),
         "body": [*_packed_body(kernel), *cpp.body_lines(kernel.program)],
     }
+
+
+def _operations_of_calls(program: Program) -> int:
+    """About how many operations the functions that a program calls come to."""
+
+    def operations(call: Call) -> int:
+        if call.function in RUNTIME_HEADERS:
+            return INLINED_WITH_CALLS + 1
+        if call.function.startswith("compensated"):
+            return 5 * len(call.arguments)
+        if call.function.startswith("double_word"):
+            return 10
+        return 30 if call.function in ("sin_cos", "atan2", "acos") else 1
+
+    return sum(operations(node) for node in program.nodes() if isinstance(node, Call))
 
 
 def _packed_body(kernel: Kernel) -> list[str]:
