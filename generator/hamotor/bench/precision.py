@@ -17,7 +17,6 @@ from dataclasses import asdict, replace
 from fractions import Fraction
 from math import isfinite
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, Final
 
 import numpy as np
@@ -82,7 +81,7 @@ QUICK: Final = Extent(
     3, 2.0, 0.01, 0.02, False, COMPILERS[:1],
     methods=("rkmk4", "rkmk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
-_TYPICAL_S: Final = {"whole": 120.0, "part": 40.0, "quick": 35.0}
+_TYPICAL_S: Final = {"whole": 100.0, "part": 40.0, "quick": 35.0}
 """What a problem takes on two cores of 3 GHz, without long runs."""
 _LONG_RUNS: Final = 12.0
 """How many times as long as one of a problem's long runs may take all of them take."""
@@ -103,8 +102,8 @@ def bench_precision(
     """Run and account for the benchmark of precision.
 
     scenes: names or paths of scenes, NAME@END to end at this time (s); if not given the benchmark's
-    own problems and all bundled scenes, of which one of each structure in each algebra has other
-    kernels, representations, algebras, scalars and compilers, too.  out: where precision.json, the
+    own problems and all bundled scenes, of which one of each structure in each algebra and group
+    has other kernels, representations, algebras and scalars, too.  out: where precision.json, the
     diagrams and precision.html go, written again after every problem, and precision_NAME.json, from
     which a later call takes what it would only measure again; None: nowhere.  json: print the
     account on stdout instead of the table.  quick: a method of each family, fewer settings and
@@ -121,28 +120,36 @@ def bench_precision(
     extent = QUICK if quick else FULL
     if drift is not None:
         extent = replace(extent, drift=drift, longest_run_s=max(10.0, drift / 1e6))
-    alike = {} if scenes or quick else alike_to(problems)
+    alike = None if scenes or quick else alike_to(problems)
     account = measure(problems, extent, peers, gaps, out, alike)
     publish(account, table, out=None, as_json=json)
     return account
 
 
 def alike_to(problems: Sequence[Problem]) -> dict[str, str]:
-    """Problems whose structure and algebra another one before them has, and which that is."""
-    first: dict[tuple[str, str], str] = {}
+    """Problems whose structure, algebra and group another one before them has, and which that is.
+
+    One whose bodies have several groups is like no other.
+    """
+    first: dict[tuple[str, ...], str] = {}
+    found = {}
     for one in problems:
-        first.setdefault((one.simulation.structure, one.algebra), one.name)
-    firsts = {one.name: first[one.simulation.structure, one.algebra] for one in problems}
-    return {name: of for name, of in firsts.items() if of != name}
+        group = getattr(getattr(one.scene, "group", None), "name", one.name)
+        name = first.setdefault((one.simulation.structure, one.algebra, group), one.name)
+        if name != one.name:
+            found[one.name] = name
+    return found
 
 
-def _extent_of(one: Problem, extent: Extent, alike: bool) -> Extent:
-    """That of a problem which is alike to another."""
-    if not alike:
+def _extent_of(one: Problem, extent: Extent, alike: Mapping[str, str] | None) -> Extent:
+    """Of what is not the benchmark's own less, beside many others."""
+    if alike is None:
         return extent
+    forms = extent.forms and one.name not in alike
     if one.name in own_problems():
-        return replace(extent, forms=False)
-    return replace(extent, forms=False, counted=False, compilers=extent.compilers[:1])
+        return replace(extent, forms=forms)
+    counted = extent.counted and forms
+    return replace(extent, forms=forms, counted=counted, compilers=extent.compilers[:1])
 
 
 def measure(
@@ -151,18 +158,18 @@ def measure(
     peers: Mapping[str, str],
     gaps: Mapping[str, str],
     out: Path | None = None,
-    alike: Mapping[str, str] = MappingProxyType({}),
+    alike: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
     """The account of these problems, with the peers there are (package → version).
 
     With `out` the report is written after each problem; what was measured before with all the same
     is read from there.  Of several problems those that cannot be measured are gaps; one alone
     raises.  alike: what each of these is so like that only generated kernels in double are measured
-    of it, by one compiler and not counted if it is not the benchmark's own.
+    of it, not counted if it is not the benchmark's own; of those one compiler is enough then.
     """
     about = _provenance(_compilers(extent), peers, extent)
     missing = dict(gaps)
-    extents = {one.name: _extent_of(one, extent, one.name in alike) for one in problems}
+    extents = {one.name: _extent_of(one, extent, alike) for one in problems}
     kept: dict[str, Mapping[str, Any]] = {}
     for one in problems:
         part = _read(_file_of(one, out), _key(one, extents[one.name], about))
@@ -178,11 +185,10 @@ def measure(
             else:
                 say(f"{one.name}: {index + 1} of {len(problems)} problems, {left}")
                 measured = _measured(one, own, peers)
-                if one.name in alike:
-                    of = alike[one.name]
+                if of := (alike or {}).get(one.name):
                     measured["missing"][f"other kernels, scalars and such on {one.name}"] = (
-                        f"left out: its structure and algebra are those of {of}, which has them;"
-                        f" bench precision {one.name} measures them"
+                        f"left out: its structure, algebra and group are those of {of}, which has"
+                        f" them; bench precision {one.name} measures them here"
                     )
                 parts[one.name] = {"key": _key(one, own, about), **measured}
         except KeyboardInterrupt:

@@ -70,7 +70,7 @@ _INCLUDES: Final = ("/usr/include", "/usr/local/include", "/opt/homebrew/include
 _PYTHON_IS_SLOWER: Final = 20
 """How many times as long as others those may take that are called from Python."""
 _TIGHT: Final = 1e-14
-SILENT_S: Final = 60.0
+SILENT_S: Final = 30.0
 """How long the stopwatch may be at one setting: some hundred times what any takes."""
 
 
