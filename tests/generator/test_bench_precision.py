@@ -506,9 +506,10 @@ def test_settings_that_take_long_to_fail_are_not_all_tried() -> None:
             if self.setting < 7:
                 raise peers.Refused("no")
             watch = peers.Watch()
-            watch.time(lambda: None)
+            watch.seconds = watch.processor = [far * 2e-12]
             return peers.Result(watch, [0.0], 1, 1)
 
+    far = 1
     contestant = {
         "kind": "failing", "settings": list(range(12)), "longest_s": 1e-12, "options": {}
     }  # fmt: skip
@@ -520,6 +521,12 @@ def test_settings_that_take_long_to_fail_are_not_all_tried() -> None:
     assert list(dict.fromkeys(tried)) == [0, 2, 5, 9, 10]
     runs = [row["runs"] for row in said if row.get("setting") == 9 and "runs" in row]
     assert runs[-1] > runs[0]
+    far = 3
+    tried.clear()
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(peers, "MAKERS", {"failing": Failing})
+        list(stopwatch.rows({**job, "rounds": 0}, list))
+    assert list(dict.fromkeys(tried)) == [0, 2, 5, 9]
 
 
 def test_a_long_run_that_explodes_is_a_row_that_says_when() -> None:

@@ -32,9 +32,9 @@ is not in them and listed apart.
 A setting meets a target only if the next two finer ones meet it as well.
 What fails or does not converge is a row and says why; so is what takes more than half a minute or \
 ends its process, of which nothing finer is tried. Settings go from coarse to fine until two in a \
-row take longer than 15 ms (10 ms if quick) of processor time, 20 times that where the solver is \
-called from Python; after one that takes so long to fail, the next is left out, after another one \
-two, and so on. \
+row take longer than 15 ms (10 ms if quick) of processor time, or one four times that, 20 times as \
+long where the solver is called from Python; after one that takes so long to fail, the next is \
+left out, after another one two, and so on. \
 Other kernels, representations and scalars begin with the longest step at which generated kernels \
 in double did not fail, and are left out where these take longer than 15 ms at every setting. If \
 no scenes are named, one problem of each structure in each algebra and group has them; others that \

@@ -1,11 +1,11 @@
 """Times contestants in one process: `-m tests.bench.precision.stopwatch JOB` writes rows of JSON.
 
 A contestant is a list of settings from coarse to fine.  Each setting runs once or, if short or
-disturbed, three times, until two in a row take longer than the contestant may; after each that
-fails and takes so long, one more of the next is left out.  Who asked is told how each ended, and
-answers with those that are worth more; then rounds go over these of all contestants, so that what
-else runs on the machine disturbs all alike.  Runs in the peers' environment and needs nothing of
-Hamotor.
+disturbed, three times, until two in a row take longer than the contestant may or one four times as
+long; after each that fails and takes so long, one more of the next is left out.  Who asked is told
+how each ended, and answers with those that are worth more; then rounds go over these of all
+contestants, so that what else runs on the machine disturbs all alike.  Runs in the peers'
+environment and needs nothing of Hamotor.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ _BATCH_S = 3e-4
 _LARGEST_BATCH = 10
 _SHORT_S = 1e-3
 _DISTURBED = 1.3
+_FAR = 4
 
 Worth = Callable[[], Iterable[tuple[int, int]]]
 """Contestants and settings that are worth more than one run."""
@@ -134,7 +135,8 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
                 entry = Entry(at, _timed(job, contestant, setting, problem))
                 entry.run()
                 while len(entry.seconds) < 3 and (
-                    sum(entry.seconds) < _SHORT_S or entry.was_disturbed
+                    sum(entry.seconds) < _SHORT_S
+                    or (entry.was_disturbed and entry.needs_s < contestant["longest_s"])
                 ):
                     entry.run()
             except (peers.Refused, ArithmeticError, ValueError, RuntimeError) as problem_met:
@@ -145,7 +147,7 @@ def rows(job: Mapping[str, Any], worth: Worth) -> Iterator[dict[str, Any]]:
                 continue
             entries.append(entry)
             slow = slow + 1 if entry.needs_s > contestant["longest_s"] else 0
-            if slow == 2:
+            if slow == 2 or entry.needs_s > _FAR * contestant["longest_s"]:
                 break
     for entry in entries:
         yield entry.row()
