@@ -337,7 +337,7 @@ def _signature(text: str) -> tuple[int, int, int]:
 
 def _whole_number(text: str) -> int:
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f'must be a whole number, not "{text}"')
+        raise argparse.ArgumentTypeError(f'must be a whole number, at least 0, not "{text}"')
     return int(text)
 
 

@@ -52,6 +52,7 @@ def test_an_ensemble_prints_its_summary_and_writes_into_runs(
     assert main(["run", "some", "--ensemble", "20", "--seed", "2", "--keep", "3,5"]) == 0
     printed = capsys.readouterr().out
     assert "20 members, seed 2" in printed
+    assert "million steps of members a second" in printed
     assert "members/ (2 trajectories)" in printed
     folder = toy_scene / "runs" / "toy_ensemble"
     assert {p.name for p in folder.iterdir()} == {
@@ -149,6 +150,7 @@ def test_a_rejected_text_exits_with_4(
         ("run toy --step 1 --tolerance 1", "not allowed with"),
         ("run toy --ensemble 10", "all members would be the same"),
         ("run toy --seed 1", "--seed goes with --ensemble N"),
+        ("run toy --ensemble 2 --seed -1", 'at least 0, not "-1"'),
         ("run toy --ensemble 2 --tolerance 1", "it is verified for single runs"),
         ("run toy --engine dask", "--engine goes with --ensemble N"),
         ("run toy --kernels hand", 'unknown kernels "hand"'),

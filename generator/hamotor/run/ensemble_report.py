@@ -164,8 +164,9 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
         f"({order_in_words(said['order'])}) · {said['scalar']}"
     )
     speed = (
-        f"  {timing['wall_s']:.3g} s in all, {timing['ns_per_step']:.3g} ns of a core for a "
-        f"member's step ({'dask' if many['engine'] == 'dask' else where}, "
+        f"  {timing['wall_s']:.3g} s in all, {timing['member_steps_per_s'] / 1e6:.3g} million "
+        f"steps of members a second, {timing['ns_per_step']:.3g} ns of a core for each "
+        f"({'dask' if many['engine'] == 'dask' else where}, "
         f"{many['lanes']} lane{'s' * (many['lanes'] != 1)}, {many['isa']})"
     )
     lines = [what, f"  {who}, {seed}, {steps}", speed]
