@@ -552,7 +552,7 @@ def _together(
         )
     except HamotorError as refusal:
         if len(methods) == 1:
-            return {methods[0]: str(refusal).splitlines()[0]}
+            return {methods[0]: " ".join(map(str.strip, str(refusal).splitlines()[:2]))}
         # Only a series has text of its own, which not every scene has.
         series = tuple(m for m in methods if m == "taylor")
         others = tuple(m for m in methods if m != "taylor")

@@ -264,25 +264,40 @@ def table(account: Mapping[str, Any]) -> str:
 
 
 def _long_runs(drift: Rows) -> list[str]:
-    """Energy and phase at the end of the long runs, with how they grew."""
-    lines = (
-        ["", "long runs: largest relative error of the energy, and rad of the phase, as steps^p"]
-        if drift
-        else []
-    )
+    """Energy, the worst momentum and phase at the end of the long runs, with how they grew."""
+    runs: dict[tuple[str, str], list[Mapping[str, Any]]] = {}
     for row in drift:
-        if row["quantity"] not in ("energy", "energy_balance", ATTITUDE):
-            continue
-        largest = "-" if row["largest"] is None else f"{row['largest']:.1e}"
-        grown = "-"
-        if row["exponent"] is not None:
-            grown = f"{row['exponent']:.2f} ± {row['exponent_error']:.2f}"
-        lines.append(
-            f"  {row['problem']:<12}{row['contestant']:<22}{row['steps']:>12,} steps of"
-            f" {row['step']:g} s  {row['quantity'].split()[0]:<9}{largest:>9}"
-            f"   p = {grown}" + (f"; {row['failure']}" if row["failure"] else "")
+        runs.setdefault((row["problem"], row["contestant"]), []).append(row)
+    if not runs:
+        return []
+    lines = [
+        "",
+        "long runs: the largest error, relative or of the attitude in rad, growing as steps^p",
+        f"  {'':<34}{'steps':>13}  {'energy':<18}{'momentum':<18}attitude",
+    ]
+    asked = {p: max(r["steps"] for r in drift if r["problem"] == p) for p, _ in runs}
+    for (problem, contestant), rows in runs.items():
+        kinds = (
+            [r for r in rows if r["quantity"] in ("energy", "energy_balance")],
+            [r for r in rows if "momentum" in r["quantity"]],
+            [r for r in rows if r["quantity"] == ATTITUDE],
         )
+        cells = "".join(f"{_growth(kind):<18}" for kind in kinds)
+        first = rows[0]
+        why = first["failure"] or ("too slow for more" * (first["steps"] < asked[problem]))
+        line = f"  {problem:<12}{contestant:<22}{first['steps']:>13,}  {cells}{why}"
+        lines.append(line.rstrip())
     return lines
+
+
+def _growth(rows: Rows) -> str:
+    """The largest of these quantities' errors and its exponent."""
+    there = [r for r in rows if r["largest"] is not None]
+    if not there:
+        return "-"
+    worst = max(there, key=lambda r: r["largest"])
+    grown = "-" if worst["exponent"] is None else f"{worst['exponent']:.2f}"
+    return f"{worst['largest']:.1e} p {grown}"
 
 
 def _cells(found: Mapping[str, Any] | None, width: int) -> str:
