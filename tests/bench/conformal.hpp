@@ -46,6 +46,11 @@ struct Vector {
   using Exact = cga3::Vector<Quad>;
   [[nodiscard]] static Exact make(Source& source) { return random<Exact>(source, 1.0); }
 };
+/// A versor held as its matrix on vectors: it is given, and the time to make it is not.
+struct MatrixOnVector {
+  using Exact = cga3::Versor<Quad>;
+  [[nodiscard]] static Exact make(Source& source) { return Versor::make(source); }
+};
 struct Trivector {
   using Exact = cga3::Trivector<Quad>;
   [[nodiscard]] static Exact make(Source& source) { return random<Exact>(source, 1.0); }
@@ -84,6 +89,10 @@ struct MoveVector : Move<kind::conformal::Vector> {
   static constexpr const char* name = "cga3 vector";
   using A = kind::conformal::Versor;
 };
+struct TransformVector : Transform<kind::conformal::Vector> {
+  static constexpr const char* name = "cga3 vector, matrix given";
+  using A = kind::conformal::MatrixOnVector;
+};
 struct MoveBivector : Move<kind::conformal::Bivector> {
   static constexpr const char* name = "cga3 bivector";
   using A = kind::conformal::Versor;
@@ -118,6 +127,7 @@ void enter_conformal() {
   enter_for<C, operation::conformal::EvenProduct>();
   enter_for<C, operation::conformal::VersorProduct>();
   enter_for<C, operation::conformal::MoveVector>();
+  enter_for<C, operation::conformal::TransformVector>();
   enter_for<C, operation::conformal::MoveBivector>();
   enter_for<C, operation::conformal::BivectorTrivector>();
   enter_for<C, operation::conformal::Exp>();

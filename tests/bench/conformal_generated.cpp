@@ -13,6 +13,9 @@ struct ConformalGenerated {
   [[nodiscard]] static auto make(Kind, const typename Kind::Exact& x) {
     return x.template cast<S>();
   }
+  [[nodiscard]] static auto make(kind::conformal::MatrixOnVector, const cga3::Versor<Quad>& m) {
+    return vector_matrix(m).template cast<S>();
+  }
   template <class Kind>
   [[nodiscard]] static auto exact(Kind, const auto& x) {
     return x.template cast<Quad>();
@@ -27,6 +30,14 @@ struct ConformalGenerated {
   }
   template <class Kind>
   [[nodiscard]] HAMOTOR_INLINE static auto move(Kind, const cga3::Versor<S>& m, const auto& x) {
+    return sandwich(m, x);
+  }
+  template <class Kind>
+  [[nodiscard]] HAMOTOR_INLINE static auto transform(Kind, const auto& a, const auto& x) {
+    return cga3::transform(a, x);
+  }
+  template <class Kind>
+  [[nodiscard]] static auto transform(Kind, const cga3::Versor<S>& m, const auto& x) {
     return sandwich(m, x);
   }
   [[nodiscard]] HAMOTOR_INLINE static auto bivector_trivector(const cga3::Bivector<S>& a,
@@ -57,6 +68,7 @@ using namespace operation::conformal;
 template Values reference<EvenProduct>(const cga3::Even<Quad>&, const cga3::Even<Quad>&);
 template Values reference<VersorProduct>(const cga3::Versor<Quad>&, const cga3::Versor<Quad>&);
 template Values reference<MoveVector>(const cga3::Versor<Quad>&, const cga3::Vector<Quad>&);
+template Values reference<TransformVector>(const cga3::Versor<Quad>&, const cga3::Vector<Quad>&);
 template Values reference<MoveBivector>(const cga3::Versor<Quad>&, const cga3::Bivector<Quad>&);
 template Values reference<BivectorTrivector>(const cga3::Bivector<Quad>&,
                                              const cga3::Trivector<Quad>&);

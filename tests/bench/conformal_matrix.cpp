@@ -46,6 +46,9 @@ struct ConformalMatrix5 {
       all(i % 5, i / 5) = static_cast<S>(images[static_cast<unsigned>(i)]);
     return all;
   }
+  [[nodiscard]] static Matrix make(kind::conformal::MatrixOnVector, const cga3::Versor<Quad>& m) {
+    return make(kind::conformal::Versor{}, m);
+  }
   [[nodiscard]] static Matrix make(kind::conformal::Bivector, const cga3::Bivector<Quad>& b) {
     const Quad o(0);
     const std::array<Five, 5> all{{{o, b.e01, b.e02, b.e03, b.e0i},
@@ -76,8 +79,8 @@ struct ConformalMatrix5 {
   [[nodiscard]] HAMOTOR_INLINE static Matrix compose(const Matrix& a, const Matrix& b) {
     return a * b;
   }
-  [[nodiscard]] HAMOTOR_INLINE static Vector move(kind::conformal::Vector, const Matrix& m,
-                                                  const Vector& x) {
+  [[nodiscard]] HAMOTOR_INLINE static Vector transform(kind::conformal::Vector, const Matrix& m,
+                                                       const Vector& x) {
     return m * x;
   }
   [[nodiscard]] HAMOTOR_INLINE static Matrix move(kind::conformal::Bivector, const Matrix& m,

@@ -149,6 +149,7 @@ def test_every_operation_is_measured_and_every_contestant_agrees(
         "direction, matrix given", "plane, matrix given", "line, matrix given", "commutator",
         "coadjoint", "exp", "log", "exp of log", "normalize", "RK4 step", "rkmk4 step",
         "splitting2 step", "cga3 even product", "cga3 versor product", "cga3 vector",
+        "cga3 vector, matrix given",
         "cga3 bivector", "cga3 bivector trivector", "cga3 exp",
     }  # fmt: skip
     assert all((operation, "generated") in measured for operation, _ in measured)
