@@ -216,7 +216,7 @@ def main() -> None:
     job = json.loads(Path(sys.argv[1]).read_text(encoding="utf-8"))
     # Some peers greet on the standard output, which is for rows.
     with os.fdopen(os.dup(1), "w", encoding="utf-8") as answers:
-        os.dup2(2, 1)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         for row in rows(job, _told):
             print(json.dumps(row), file=answers, flush=True)
 

@@ -66,8 +66,8 @@ int evaluate(double t, N_Vector x, N_Vector rate, void* rates) {
   return 0;
 }
 
-/// As many steps as it takes.
-constexpr long any_number = -1;
+/// A hundred times what the longest runs take: steps that rounding swallows are never through.
+constexpr long most_steps = 1'000'000;
 
 template <class Rates>
 void adams(const Rates& rates, State<Rates::size>& x, double end, double tolerance, Count* count) {
@@ -79,7 +79,8 @@ void adams(const Rates& rates, State<Rates::size>& x, double end, double toleran
   check(CVodeSetUserData(memory, const_cast<Rates*>(&rates)));
   check(CVodeSStolerances(memory, tolerance, tolerance));
   check(CVodeSetNonlinearSolver(memory, iteration));
-  check(CVodeSetMaxNumSteps(memory, any_number));
+  check(CVodeSetMaxNumSteps(memory, most_steps));
+  check(CVodeSetMaxHnilWarns(memory, -1));
   check(CVodeSetStopTime(memory, end));
   double reached = 0;
   check(CVode(memory, end, state, &reached, CV_NORMAL));
@@ -100,7 +101,8 @@ void runge_kutta(const Rates& rates, State<Rates::size>& x, double end, double t
   check(ERKStepSetUserData(memory, const_cast<Rates*>(&rates)));
   check(ERKStepSStolerances(memory, tolerance, tolerance));
   check(ERKStepSetOrder(memory, order));
-  check(ERKStepSetMaxNumSteps(memory, any_number));
+  check(ERKStepSetMaxNumSteps(memory, most_steps));
+  check(ERKStepSetMaxHnilWarns(memory, -1));
   check(ERKStepSetStopTime(memory, end));
   double reached = 0;
   check(ERKStepEvolve(memory, end, state, &reached, ARK_NORMAL));
