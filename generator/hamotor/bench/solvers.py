@@ -41,8 +41,8 @@ TUNED: Final[Mapping[str, str]] = {
     "the quaternion normalised after each step.",
     "SUNDIALS": "SUNDIALS: serial vectors over the caller's array, absolute tolerance = relative, "
     "a stop time in place of interpolation, up to a million steps. CVODE with Adams' methods of "
-    "order 1 to 12 and fixed-point iteration, since nothing is stiff; ARKODE's explicit pairs that are "
-    "its defaults of orders 5 and 8.",
+    "order 1 to 12 and fixed-point iteration, since nothing is stiff; ARKODE's explicit pairs that "
+    "are its defaults of orders 5 and 8.",
     "heyoka": "heyoka: compact_mode off (on for more than 250 operations, where unrolled code "
     "takes many seconds to compile), with and without fast_math; its compilation and the time "
     "of a call that has nothing to do are taken off; its steps × order stand as evaluations.",

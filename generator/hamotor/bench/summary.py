@@ -68,7 +68,7 @@ def summary(kernels: Mapping[str, Any], precision: Mapping[str, Any]) -> str:
             f"{theirs['max_relative_error']:>8.0e}"
         )
     lines += [
-        "  below 1 is faster than Eigen; error: the largest, relative, of 1000 inputs, and Eigen's;",
+        "  below 1 is faster than Eigen; error: the largest, relative, of 1000 inputs, Eigen's;",
         "  exp and log keep their digits at every angle, exp_lean and log_lean take less time",
         "",
     ]
@@ -77,7 +77,7 @@ def summary(kernels: Mapping[str, Any], precision: Mapping[str, Any]) -> str:
         f"Motion: {said['description']}, {said['end_s']:g} s; what an error at its end costs"
     )
     lines.append(
-        f"  {'attitude':<12}{'Hamotor':>10}  {'method':<22}{'public solver':>14}  {'ratio':>5}  which"
+        f"  {'attitude':<12}{'Hamotor':>10}  {'method':<22}{'public solver':>14}  ratio  which"
     )
     rows = precision["rows"]
     for target in TARGETS:
