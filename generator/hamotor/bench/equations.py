@@ -7,8 +7,7 @@ C++ for Boost.odeint and SUNDIALS.  Common parts are local variables, so that al
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
@@ -30,9 +29,7 @@ from hamotor.codegen.program import (
     Sum,
     renamed,
 )
-from hamotor.mechanics.body_frame import Unsuitable
-from hamotor.mechanics.flow import WORK, Flow, body_flow, motor_flow, world_flow
-from hamotor.mechanics.system import System
+from hamotor.mechanics.flow import WORK, leanest
 from hamotor.scene import Scene
 from hamotor.scene.general import GeneralBody, GeneralScene, product
 from hamotor.scene.principal_system import principal_system
@@ -42,10 +39,6 @@ SMOOTH: Final = (
     "tanh",
 )  # fmt: skip
 """What every public solver's numbers have."""
-
-_PER_CALL: Final = 10
-_PER_COORDINATE: Final = 8
-"""Operations that a function, and what a solver does with a coordinate, weigh in the choice."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +165,7 @@ def equations(scene: Scene | GeneralScene) -> Equations | str:
             for body, own in zip(general.bodies, scene.bodies, strict=True)
         )
         system = principal_system(scene)
-    about, flow = min(_flows(system), key=lambda found: _weight(found[1]))
+    about, flow = leanest(system)
     unknown = sorted(flow.field.cost.calls.keys() - set(SMOOTH))
     if unknown:
         return f"the motion is not smooth: it holds {', '.join(unknown)}"
@@ -202,21 +195,6 @@ def equations(scene: Scene | GeneralScene) -> Equations | str:
         bodies=general.bodies,
         frames=frames,
     )
-
-
-def _flows(system: System) -> Iterator[tuple[str, Flow]]:
-    yield "motors and momenta", motor_flow(system)
-    with suppress(Unsuitable):
-        yield "rotors, momenta, and places seen from the body", body_flow(system, rows=False)
-    with suppress(Unsuitable):
-        about = "rotors, angular momenta, and places and linear momenta in the world"
-        yield about, world_flow(system)
-
-
-def _weight(flow: Flow) -> int:
-    cost = flow.field.cost
-    calls = sum(cost.calls.values())
-    return cost.total + _PER_CALL * calls + _PER_COORDINATE * len(flow.coordinates)
 
 
 def _told(body: GeneralBody, k: int) -> tuple[list[str], list[str]]:

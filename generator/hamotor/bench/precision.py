@@ -79,7 +79,7 @@ _FORMS: Final = (
 FULL: Final = Extent(8, 2 ** (1 / 3), 0.015, 0.15, True, COMPILERS, 10**6, 3.0, counted=True)
 QUICK: Final = Extent(
     3, 2.0, 0.01, 0.02, False, COMPILERS[:1],
-    methods=("rkmk4", "rkmk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
+    methods=("rkmk4", "rk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
 _TYPICAL_S: Final = {"whole": 100.0, "part": 40.0, "quick": 35.0}
 """What a problem takes on two cores of 3 GHz, without long runs."""

@@ -22,6 +22,11 @@ from hamotor.mechanics.system import Definition, System, folded, gradient_symbol
 
 WORK = "work"
 """The coordinate that is ∫ dH/dt dt."""
+Kind = tuple[int, str, int]
+
+_PER_CALL = 10
+_PER_COORDINATE = 8
+"""Operations that a function, and what a stepper does with a coordinate, weigh in a choice."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +37,15 @@ class Flow:
     enter: from `m{k}.NAME`, `mu{k}.NAME` and `t` to `x[i]`, the coordinates in their order.
     leave: from `x[i]` back to `m{k}.NAME` and `mu{k}.NAME`.
     refresh: from `x[i]` to those `x[i]` that follow from others and stand last.
-    parts: which coordinates are compared with each other when an error is said to be small; one
-        number for those of a kind, −1 for time and work.
+    kinds: body, "motor", "momentum" or "place", and power of a length: which coordinates are
+        compared with each other when an error is said to be small; None for time and work.
     """
 
     field: Program
     enter: Program
     leave: Program
     refresh: Program
-    parts: tuple[int, ...]
+    kinds: tuple[Kind | None, ...]
     independent: int
     """How many coordinates stand before those of `refresh`."""
 
@@ -48,6 +53,12 @@ class Flow:
     def coordinates(self) -> tuple[str, ...]:
         """The names of x."""
         return tuple(name for name, _ in self.field.outputs)
+
+    @property
+    def parts(self) -> tuple[int, ...]:
+        """A number for those of a kind, −1 for time and work."""
+        known = {kind: i for i, kind in enumerate(dict.fromkeys(filter(None, self.kinds)))}
+        return tuple(-1 if kind is None else known[kind] for kind in self.kinds)
 
 
 def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
@@ -65,6 +76,25 @@ def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
             return 3 * len(r.lanes)
         linear = len(packed.fixed) + len(packed.linear) + packed.packs
         return PACK * len(packed.products) + PACK // 2 * linear
+
+    return min(found, key=work)
+
+
+def leanest(system: System) -> tuple[str, Flow]:
+    """The flow whose field has the fewest operations, and what its coordinates are."""
+    found = [("motors and momenta", motor_flow(system))]
+    with suppress(Unsuitable):
+        about = "rotors, momenta, and places seen from the body"
+        found.append((about, body_flow(system, rows=False)))
+    with suppress(Unsuitable):
+        about = "rotors, angular momenta, and places and linear momenta in the world"
+        found.append((about, world_flow(system)))
+
+    def work(choice: tuple[str, Flow]) -> int:
+        _, flow = choice
+        cost = flow.field.cost
+        calls = sum(cost.calls.values())
+        return cost.total + _PER_CALL * calls + _PER_COORDINATE * len(flow.coordinates)
 
     return min(found, key=work)
 
@@ -89,7 +119,7 @@ def motor_flow(system: System) -> Flow:
     knows them."""
     h = system.hamiltonian
     outputs: dict[str, Expr] = {}
-    kinds: list[tuple[int, str, int] | None] = []
+    kinds: list[Kind | None] = []
     definitions: list[Definition] = list(system.pulls)
     for k, (body, rates) in enumerate(zip(h.bodies, h.rates, strict=True)):
         generators = body.group.generators
@@ -122,7 +152,7 @@ def motor_flow(system: System) -> Flow:
         straight_line(entered, system.names),
         straight_line(back, {x: f"x[{i}]" for i, x in enumerate(back.values())}),
         Program((), (), (), None),
-        _numbered(kinds),
+        tuple(kinds),
         len(outputs),
     )
 
@@ -151,7 +181,7 @@ def body_flow(system: System, *, rows: bool) -> Flow:
     places: list[Definition] = [d for frame in frames for d in frame.definitions]
     rates: list[Definition] = []
     power = sympy.diff(energy, TIME)
-    kinds: dict[Expr, tuple[int, str, int] | None] = {}
+    kinds: dict[Expr, Kind | None] = {}
     for frame in frames:
         body, k = frame.body, frame.number
         b = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in body.group.generators)
@@ -203,7 +233,7 @@ def body_flow(system: System, *, rows: bool) -> Flow:
         _entering(system, frames, motion, rotations),
         straight_line(_left(system, frames), indexed),
         straight_line(follows, indexed),
-        _numbered([kinds[s] for s in motion]),
+        tuple(kinds[s] for s in motion),
         len(independent),
     )
 
@@ -219,7 +249,7 @@ def world_flow(system: System) -> Flow:
     if h.applied or not h.autonomous:
         raise Unsuitable("applied forques")
     motion: dict[Expr, Expr] = {}
-    kinds: dict[Expr, tuple[int, str, int] | None] = {}
+    kinds: dict[Expr, Kind | None] = {}
     names: dict[Expr, str] = {}
     places: list[Definition] = []
     rates: list[Definition] = []
@@ -293,7 +323,7 @@ def world_flow(system: System) -> Flow:
         ),
         straight_line(back, indexed, rotations),
         Program((), (), (), None),
-        _numbered([kinds[s] for s in motion]),
+        tuple(kinds[s] for s in motion),
         len(motion),
     )
 
@@ -433,10 +463,3 @@ def _symbol_of(system: System, name: str) -> Expr:
 def _length(blade: str) -> int:
     """The power of a length that a blade carries: e0 of a projective, e∞ of a conformal algebra."""
     return blade.count("0") - blade.count("i")
-
-
-def _numbered(kinds: list[tuple[int, str, int] | None]) -> tuple[int, ...]:
-    known: Mapping[tuple[int, str, int], int] = {
-        kind: i for i, kind in enumerate(dict.fromkeys(k for k in kinds if k is not None))
-    }
-    return tuple(-1 if kind is None else known[kind] for kind in kinds)

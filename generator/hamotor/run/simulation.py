@@ -103,6 +103,7 @@ class Simulation:
         for the compiler.  Raises UsageError for an unknown scalar, kernels, representation or
         method, ToolError when compilation fails.
         """
+        from hamotor.scene.methods import texts_of
         from hamotor.scene.scalars import parse_scalar
 
         numbers = parse_scalar(scalar)
@@ -131,7 +132,8 @@ class Simulation:
                 raise UsageError("the matrix form has plain sums; leave compensated out.")
             source = self.matrix_source(scalar)
         else:
-            own_text: tuple[str, ...] = ("taylor",) if "taylor" in methods else ()
+            texts = texts_of(methods, in_coordinates=not ensembles)
+            own_text: tuple[str, ...] = (texts,) if texts else ()
             if ensembles and self.ensemble.parameters:
                 own_text = (*(own_text or methods[:1] or ("",)), "drawn")
             source = self.source(kernels, scalar, *own_text)

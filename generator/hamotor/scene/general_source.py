@@ -21,10 +21,11 @@ from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
+from hamotor.scene.methods import IN_COORDINATES, SERIES
 from hamotor.scene.model import Scene
 from hamotor.scene.scalars import Scalar
-from hamotor.scene.source import literal_text, rendered, shortened, text_literal
-from hamotor.scene.taylor_source import refusal, required
+from hamotor.scene.source import literal_text, needs, rendered, shortened, text_literal
+from hamotor.scene.taylor_source import field_text, refusal, required
 
 
 @dataclass(frozen=True)
@@ -128,6 +129,7 @@ def general_source(
             for s in system.drawn
         ],
         recurrence=_recurrence(scene, method, by_name),
+        field=None if by_name or drawn else _field(scene, method),
         identity=", ".join("1" if name == "s" else "0" for name in scene.group.motor),
         motor_units=[text_literal(motor_unit(scene, name)) for name in scene.group.motor],
         momentum_units=[text_literal(unit) for unit in scene.group.units],
@@ -156,7 +158,7 @@ def _refuse_drawn(scene: GeneralScene, method: str | None, own: Sequence[Any]) -
     why = ""
     if scene.lagrangian is not None:
         why = "the rates of its Lagrangian are found by Newton's method"
-    elif method == "taylor":
+    elif needs(method, SERIES):
         why = "taylor's recurrence has them as numbers"
     elif any(set(scene.drawn) & x.free_symbols for x in own):
         why = "what the scene conserves depends on them"
@@ -278,11 +280,18 @@ def _flow(system: System, k: int, part: Part, name: str, by_name: bool) -> dict[
 
 def _recurrence(scene: GeneralScene, method: str | None, by_name: bool) -> str | None:
     """The recurrence for Taylor coefficients, for the method that needs it."""
-    if method != "taylor":
+    if not needs(method, SERIES):
         return None
     if scene.lagrangian is not None:
         raise refusal(scene.name, "the rates of this Lagrangian are found by Newton's method")
     return required(scene.system, scene.name, by_name=by_name)
+
+
+def _field(scene: GeneralScene, method: str | None) -> str | None:
+    """The motion as an ordinary differential equation, for methods that step it as one."""
+    if not needs(method, *IN_COORDINATES) or scene.lagrangian is not None:
+        return None
+    return field_text(scene.system)
 
 
 def _lagrangian(lagrangian: Lagrangian, group_type: str, by_name: bool) -> dict[str, Any]:

@@ -5,6 +5,7 @@ The runtime's steppers say the same names and orders; tests compare.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from enum import Flag, auto
 
@@ -90,8 +91,21 @@ METHODS = (
         "taylor", 34, "Taylor series; order and step by a tolerance", ANY, error_controlled=True
     ),
 )
+SERIES = "taylor"
+"""Expands the motion, which is in the source of a scene for this method only."""
+IN_COORDINATES = ("rk54", "rk87")
+"""Step the motion in coordinates of the generator's choice, in sources that are for them only."""
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & (ANY | Form.FREE)))
 """What a scene may ask for."""
+
+
+def texts_of(methods: Collection[str], *, in_coordinates: bool = True) -> str:
+    """Of these methods those that stand for the texts of their own that a source needs, one space
+    apart."""
+    found = [SERIES] if SERIES in methods else []
+    if in_coordinates and set(methods) & set(IN_COORDINATES):
+        found.append(IN_COORDINATES[0])
+    return " ".join(found)
 
 
 def methods_offered(form: Form) -> dict[str, int]:

@@ -11,6 +11,7 @@ from hamotor.errors import UsageError, suggest
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.exact import decimal
 from hamotor.scene.general import GeneralScene
+from hamotor.scene.methods import IN_COORDINATES, SERIES
 from hamotor.scene.model import Body, Scene
 from hamotor.scene.motors import Vector
 from hamotor.scene.scalars import Scalar, parse_scalar
@@ -30,7 +31,8 @@ def scene_source(
 ) -> str:
     """The text of the C++ file that defines `scene` over the runtime's headers.
 
-    method: the one that it is for; "taylor" has a text of its own, which nothing else needs.
+    method: the one that it is for, or several, one space apart; those of `SERIES` and
+        `IN_COORDINATES` have texts of their own, which nothing else needs.
     form: "drawn": what [[ensemble.parameter]] draws stays variable, and the form is the general
         one.
     Deterministic: equal arguments give equal text. UsageError for unknown kernels or scalars, and
@@ -58,9 +60,15 @@ def scene_source(
         interactions=_interactions(scene, numbers),
         potential=_potential(scene),
         conserved=[_conserved(scene, quantity) for quantity in scene.conserved],
-        recurrence=_recurrence(scene) if method == "taylor" else None,
+        recurrence=_recurrence(scene) if needs(method, SERIES) else None,
+        field=_field(scene) if needs(method, *IN_COORDINATES) else None,
         events=_events(scene),
     )
+
+
+def needs(method: str | None, *names: str) -> bool:
+    """Whether a source is for one of these methods."""
+    return not set(names).isdisjoint((method or "").split())
 
 
 def _recurrence(scene: Scene) -> str:
@@ -69,6 +77,14 @@ def _recurrence(scene: Scene) -> str:
     from hamotor.scene.taylor_source import required
 
     return required(principal_system(scene), scene.name, by_name=False)
+
+
+def _field(scene: Scene) -> str:
+    """The motion as an ordinary differential equation in the cheapest coordinates."""
+    from hamotor.scene.principal_system import principal_system
+    from hamotor.scene.taylor_source import field_text
+
+    return field_text(principal_system(scene))
 
 
 def rendered(template: str, **values: Any) -> str:

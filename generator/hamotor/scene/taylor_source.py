@@ -1,7 +1,8 @@
-"""The C++ text of the recurrence for a scene's Taylor coefficients."""
+"""The C++ text of a scene's motion as ẋ = f(x), and of the recurrence for its Taylor series."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -9,7 +10,7 @@ from hamotor.codegen import cpp
 from hamotor.codegen.program import Program, renamed
 from hamotor.codegen.taylor import PACK, NotAnalytic, PackedTerm, Quadratic, steps
 from hamotor.errors import UsageError
-from hamotor.mechanics.flow import WORK, cheapest
+from hamotor.mechanics.flow import WORK, Flow, cheapest, leanest
 from hamotor.mechanics.system import System
 from hamotor.scene.source import rendered
 
@@ -38,11 +39,66 @@ def recurrence_text(system: System, *, by_name: bool) -> str:
     order = packed.order if packed else tuple(range(len(flow.coordinates)))
     # Where packs want them; `x[i]` is renamed everywhere.
     places = {f"x[{old}]": f"x[{new}]" for new, old in enumerate(order)}
-    names = [flow.coordinates[old] for old in order]
     programs = steps(
         replace(expansion, derivatives=tuple(expansion.derivatives[old] for old in order))
     )
+    padding = -len(order) % PACK
+    return rendered(
+        "taylor.hpp.jinja",
+        **_coordinates(system, flow, order, by_name=by_name),
+        follows=["true" if old >= flow.independent else "false" for old in order]
+        + ["false"] * padding,
+        lanes=len(expansion.lanes),
+        known=programs.known,
+        refresh=_text(renamed(flow.refresh, places)),
+        first=_text(programs.first),
+        next=_text(programs.next),
+        packed=_packed(packed, padding) if packed else None,
+    )
+
+
+def field_text(system: System) -> str:
+    """The type `Field` of a system: its motion in the coordinates with the fewest operations."""
+    _, flow = leanest(system)
+    order = range(len(flow.coordinates))
+    given = _coordinates(system, flow, order, by_name=False)
+    padding = len(given["parts"]) - len(order)
+    places = {name: f"x[{i}]" for i, name in enumerate(flow.coordinates)}
+    rates = renamed(flow.field, places)
+    weight = {"motor": "1", "place": "0.5", "momentum": "0"}
+    return rendered(
+        "field.hpp.jinja",
+        **given,
+        numbers=len(order),
+        time=flow.coordinates.index("t") if "t" in flow.coordinates else None,
+        held=[
+            (k, n, place)
+            for k, body in enumerate(given["bodies"])
+            for n, place in enumerate(body["coordinates"])
+            if place is not None
+        ],
+        weights=[
+            *("0" if kind is None else weight[kind[1]] for kind in flow.kinds),
+            *["0"] * padding,
+        ],
+        rates=_text(
+            replace(
+                rates,
+                outputs=tuple((f"change[{i}]", x) for i, (_, x) in enumerate(rates.outputs)),
+            )
+        ),
+    )
+
+
+def _coordinates(
+    system: System, flow: Flow, order: Sequence[int], *, by_name: bool
+) -> dict[str, Any]:
+    """What both texts say of coordinates, in this order: `coordinates.hpp.jinja`."""
+    places = {f"x[{old}]": f"x[{new}]" for new, old in enumerate(order)}
+    names = [flow.coordinates[old] for old in order]
     leave = renamed(flow.leave, places)
+    entered = dict(renamed(flow.enter, places).outputs)
+    padding = -len(names) % PACK
     bodies = []
     for k, body in enumerate(system.hamiltonian.bodies):
         motor = [f"m{k}.{c.name}" for c in body.group.element.components]
@@ -54,32 +110,20 @@ def recurrence_text(system: System, *, by_name: bool) -> str:
                 "coordinates": [names.index(name) if name in names else None for name in motor],
             }
         )
-    entered = dict(renamed(flow.enter, places).outputs)
-    coordinates = -(-len(names) // PACK) * PACK
-    padding = coordinates - len(names)
-    return rendered(
-        "taylor.hpp.jinja",
-        by_name=by_name,
-        bodies=bodies,
-        coordinates=coordinates,
-        parts=[*(flow.parts[old] for old in order), *[-1] * padding],
-        work=names.index(WORK) if WORK in names else None,
-        follows=["true" if old >= flow.independent else "false" for old in order]
-        + ["false"] * padding,
-        lanes=len(expansion.lanes),
-        known=programs.known,
-        enter=_text(
+    return {
+        "by_name": by_name,
+        "bodies": bodies,
+        "coordinates": len(names) + padding,
+        "parts": [*(flow.parts[old] for old in order), *[-1] * padding],
+        "work": names.index(WORK) if WORK in names else None,
+        "enter": _text(
             replace(
                 flow.enter,
                 outputs=tuple((f"x[{i}]", entered[f"x[{i}]"]) for i in range(len(names))),
             )
         ),
-        leave=_text(leave),
-        refresh=_text(renamed(flow.refresh, places)),
-        first=_text(programs.first),
-        next=_text(programs.next),
-        packed=_packed(packed, padding) if packed else None,
-    )
+        "leave": _text(leave),
+    }
 
 
 def _packed(field: Quadratic, padding: int) -> dict[str, Any]:

@@ -4,6 +4,7 @@
 #include <tuple>
 
 #include "hamotor/adaptive.hpp"
+#include "hamotor/field_pair.hpp"
 #include "hamotor/free_body.hpp"
 #include "hamotor/gauss.hpp"
 #include "hamotor/moser_veselov.hpp"
@@ -22,16 +23,25 @@ namespace detail {
 template <class System, class Pair, class Coordinates, Summation... asked>
 using AdaptivePair = Adaptive<System, ExplicitPair<System, Pair, Coordinates, asked...>>;
 
+template <class System, class Pair, Summation... asked>
+struct PairOf {
+  using type = ExplicitPair<System, Pair, Components, asked...>;
+};
+template <SystemWithField System, class Pair, Summation... asked>
+struct PairOf<System, Pair, asked...> {
+  using type = FieldPair<System, Pair, asked...>;
+};
+
 template <class System, Summation... asked>
 struct Steppers {
   using type = std::tuple<
       Rkmk4<System, asked...>, AdaptivePair<System, DormandPrince54, ExponentialChart, asked...>,
       AdaptivePair<System, PrinceDormand87, ExponentialChart, asked...>,
       CommutatorFree4<System, asked...>, Rk4<System, asked...>,
-      AdaptivePair<System, DormandPrince54, Components, asked...>,
-      AdaptivePair<System, PrinceDormand87, Components, asked...>, Gauss<System, 1, asked...>,
-      Gauss<System, 2, asked...>, Gauss<System, 3, asked...>, Gauss<System, 4, asked...>,
-      Gauss<System, 6, asked...>, Gauss<System, 8, asked...>>;
+      Adaptive<System, typename PairOf<System, DormandPrince54, asked...>::type>,
+      Adaptive<System, typename PairOf<System, PrinceDormand87, asked...>::type>,
+      Gauss<System, 1, asked...>, Gauss<System, 2, asked...>, Gauss<System, 3, asked...>,
+      Gauss<System, 4, asked...>, Gauss<System, 6, asked...>, Gauss<System, 8, asked...>>;
 };
 
 template <class System, Summation... asked>

@@ -105,6 +105,16 @@ struct Pack {
 template <class S>
 using Lanes = typename Pack<S>::Lanes;
 
+/// Half of it: where numbers are computed one by one in between, for which a processor that works
+/// on 512 bits has one unit less.
+template <class S>
+struct HalfPack {
+  using Lanes [[gnu::vector_size(4 * sizeof(S))]] = S;
+};
+
+template <class S>
+using HalfLanes = typename HalfPack<S>::Lanes;
+
 #ifdef __AVX512F__
 [[nodiscard]] HAMOTOR_INLINE inline Lanes<double> packed_mul_add(const Lanes<double>& a,
                                                                  const Lanes<double>& b,
@@ -117,11 +127,21 @@ using Lanes = typename Pack<S>::Lanes;
                                                                 const Lanes<float>& c) noexcept {
   return _mm256_fmadd_ps(a, b, c);
 }
+
+[[nodiscard]] HAMOTOR_INLINE inline HalfLanes<double> packed_mul_add(
+    const HalfLanes<double>& a, const HalfLanes<double>& b, const HalfLanes<double>& c) noexcept {
+  return _mm256_fmadd_pd(a, b, c);
+}
+
+[[nodiscard]] HAMOTOR_INLINE inline HalfLanes<float> packed_mul_add(
+    const HalfLanes<float>& a, const HalfLanes<float>& b, const HalfLanes<float>& c) noexcept {
+  return _mm_fmadd_ps(a, b, c);
+}
 #else
 template <class V>
 [[nodiscard]] HAMOTOR_INLINE inline V packed_mul_add(const V& a, const V& b, const V& c) noexcept {
   V sum = c;
-  for (int k = 0; k < 8; ++k) sum[k] = mul_add(a[k], b[k], c[k]);
+  for (std::size_t k = 0; k < sizeof a / sizeof a[0]; ++k) sum[k] = mul_add(a[k], b[k], c[k]);
   return sum;
 }
 #endif

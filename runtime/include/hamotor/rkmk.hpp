@@ -232,24 +232,7 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
     return sum;
   }
 
-  /// The pair's numbers, rounded to S once.
-  struct Table {
-    std::array<std::array<S, all_stages>, all_stages> rows{};
-    std::array<S, all_stages> nodes{};
-    std::array<S, stages> weights = detail::numbers<S>(Pair::weights);
-    std::array<S, stages> error = detail::numbers<S>(Pair::error);
-
-    constexpr Table() noexcept {
-      using Wide = detail::CoefficientScalar<S>;
-      for (std::size_t s = 0; s < all_stages; ++s) {
-        rows[s] = detail::numbers<S>(Pair::rows[s]);
-        Wide node(0);
-        for (const auto& x : detail::numbers<Wide>(Pair::rows[s])) node = node + x;
-        nodes[s] = static_cast<S>(node);
-      }
-    }
-  };
-  static inline const Table table{};
+  static constexpr const detail::PairTable<Pair, S>& table = detail::pair_table<Pair, S>;
 
   /// Finds the slopes of a step from `start` at t that are not known yet, up to so many stages.
   constexpr void find_slopes(const System& system, const StateOf<System>& start, const S& t,

@@ -311,6 +311,28 @@ struct PrinceDormand87 {
 
 namespace detail {
 
+/// The pair's numbers, rounded to S once.
+template <class Pair, class S>
+struct PairTable {
+  static constexpr std::size_t all_stages = Pair::dense_stages;
+  std::array<std::array<S, all_stages>, all_stages> rows{};
+  std::array<S, all_stages> nodes{};
+  std::array<S, Pair::stages> weights = numbers<S>(Pair::weights);
+  std::array<S, Pair::stages> error = numbers<S>(Pair::error);
+
+  constexpr PairTable() noexcept {
+    using Wide = CoefficientScalar<S>;
+    for (std::size_t s = 0; s < all_stages; ++s) {
+      rows[s] = numbers<S>(Pair::rows[s]);
+      Wide node(0);
+      for (const auto& x : numbers<Wide>(Pair::rows[s])) node = node + x;
+      nodes[s] = static_cast<S>(node);
+    }
+  }
+};
+template <class Pair, class S>
+inline const PairTable<Pair, S> pair_table{};
+
 /// What `continuous_weights` needs of a pair, rounded to S once.
 template <class Pair, class S>
 struct ContinuousExtension {
