@@ -295,11 +295,28 @@ def test_other_forms_begin_where_a_method_does_not_fail() -> None:
 def test_of_each_structure_in_each_algebra_one_problem_is_measured_in_all_forms() -> None:
     default = {name.partition("@")[0] for name in default_problems()}
     assert default == {*own_problems(), *(name for name, _ in bundled_scenes())}
-    some = [problem(name) for name in ("P3", "P3b+", "heavy_top", "magnet", "kirchhoff", "kepler")]
-    alike = precision.alike_to(some)
-    assert alike == {"P3b+": "P3", "heavy_top": "P3"}
+    some = [problem(name) for name in ("P1", "P3", "heavy_top", "dzhanibekov", "tumble")]
+    assert precision.alike_to(some) == {"heavy_top": "P3", "tumble": "dzhanibekov"}
     said = str(precision.Left([130.0, 50.0]))
     assert said == "about 3 min for the 2 left on two cores"
+
+
+def test_what_is_alike_is_measured_in_one_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    extents: dict[str, Extent] = {}
+
+    def measured(one: Problem, extent: Extent, _: Mapping[str, str]) -> dict[str, Any]:
+        extents[one.name] = extent
+        said = {"norm": ATTITUDE, "goals": [], "wall_s": {"time": 1.0}}
+        return {"problem": said, "rows": [], "drift": [], "missing": {}}
+
+    monkeypatch.setattr(precision, "_measured", measured)
+    some = [problem(name) for name in ("P3", "P3b+", "heavy_top")]
+    account = measure(some, precision.FULL, {}, {}, None, precision.alike_to(some))
+    assert [extents[one.name].forms for one in some] == [True, False, False]
+    assert [extents[one.name].counted for one in some] == [True, True, False]
+    assert [len(extents[one.name].compilers) for one in some] == [2, 2, 1]
+    gaps = " ".join(account["not_there"].values())
+    assert "those of P3, which has them; bench precision heavy_top measures them here" in gaps
 
 
 def test_a_problem_may_end_earlier() -> None:
