@@ -21,7 +21,7 @@ from hamotor.bench.contest import Contestant, Extent, Form, Row
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
-from hamotor.bench.precision_report import best, coverage, over_problems, table
+from hamotor.bench.precision_report import best, coverage, draw, over_problems, table
 from hamotor.bench.problems import (
     REFERENCES,
     Problem,
@@ -89,6 +89,20 @@ def _rows(errors: Sequence[float], microseconds: Sequence[float]) -> list[Mappin
         }
         for e, t in zip(errors, microseconds, strict=True)
     ]  # fmt: skip
+
+
+def test_a_diagram_without_a_point_is_empty(tmp_path: Path) -> None:
+    problem_said = {"norm": ATTITUDE, "description": "nothing turns"}
+    account = {"problems": {"p": problem_said}, "rows": _rows([0.0] * 4, [1.0] * 4), "targets": [1]}
+    (file,) = draw(account, "p", [tmp_path / "p.png"])
+    assert file.is_file()
+
+
+def test_translations_have_no_attitude() -> None:
+    one = problem("kepler")
+    library = one.simulation.compile(method="rk4").library
+    with library.start("rk4", step=one.simulation.end, state=one.simulation.state) as live:
+        assert ATTITUDE not in endpoint.of_row(library.description, live.observe())
 
 
 def test_a_setting_counts_only_if_the_next_two_finer_ones_meet_the_target() -> None:

@@ -355,12 +355,14 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
     ax = figure.subplots()
     colours = iter(_COLOURS)
     shown: dict[str, int] = {}
+    any_point = False  # without one there is no logarithm of anything
     for name in chosen:
         ladder = [
             row
             for row in ladders[name]
-            if row["failure"] is None and 0 < row["errors"].get(norm, -1) < 1
+            if row["failure"] is None and 0 < row["errors"].get(norm, -1) < 1 and row["best_us"] > 0
         ]
+        any_point |= bool(ladder)
         family = ladders[name][0]["family"]
         ours = family == "hamotor"
         shown[family] = shown.get(family, -1) + 1
@@ -381,8 +383,9 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
             ax.errorbar([], [], linestyle="", label=f"{who}: not within {_COARSEST:g} in time")
     for target in account["targets"]:
         ax.axhline(target, color="#eeeeee", linewidth=0.8, zorder=0)
-    ax.set_xscale("log")
-    ax.set_yscale("log")
+    if any_point:
+        ax.set_xscale("log")
+        ax.set_yscale("log")
     ax.set_xlabel("time of the whole integration, µs (best of the runs; bars to the median)")
     ax.set_ylabel(f"error at the end: {norm}")
     figure.suptitle(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
