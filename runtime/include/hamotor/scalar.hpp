@@ -55,6 +55,14 @@ int quadmath_snprintf(char*, std::size_t, const char*, ...) noexcept;
 #define HAMOTOR_INLINE
 #endif
 
+/// Marks one that is so in ensembles: larger ones only pay where states are packs, which go through
+/// memory for a call.
+#ifdef HAMOTOR_ENSEMBLE
+#define HAMOTOR_INLINE_IN_ENSEMBLES HAMOTOR_INLINE
+#else
+#define HAMOTOR_INLINE_IN_ENSEMBLES
+#endif
+
 /// With HAMOTOR_FUSED multiply-adds are rounded once on every processor, by the C library's
 /// function where it has no instruction for them (ten times slower), so that the bits are the same
 /// on all.

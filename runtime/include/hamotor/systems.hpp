@@ -669,22 +669,29 @@ struct SpringBetween {
   template <class System, class Motors, class Momenta, class Weights>
   HAMOTOR_INLINE constexpr void add_forque(const System& system, const Motors& motors,
                                            Momenta& forque, const Weights& weights) const noexcept {
-    using Direction = typename Space<G>::template Direction<S>;
     const auto f = extension(system, motors);
     const S pull = detail::tension<rest>(stiffness, rest_length, f);
-    const auto add = [&](std::size_t body, const S& tension, const auto& at) {
-      const auto seen = sandwich(reverse(motors[body]), Direction::from(f)).components();
-      forque[body] = Space<G>::with_force(forque[body], weights[body] * tension, at, seen);
-    };
-    add(one, -pull, at_one);
-    add(two, pull, at_two);
+    forque[one] = with_end(forque[one], weights[one] * -pull, motors[one], at_one, f);
+    forque[two] = with_end(forque[two], weights[two] * pull, motors[two], at_two, f);
   }
 
  private:
+  /// μ and `pull` times the force line of f, world frame, through a point of a body.  A function,
+  /// as g++ leaves a lambda as a call, for which a state goes through memory.
+  template <class Momentum, class Motor>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Momentum with_end(
+      const Momentum& mu, const S& pull, const Motor& motor,
+      const typename Space<G>::template Point<S>& at,
+      const std::array<S, Space<G>::dimension>& f) noexcept {
+    using Direction = typename Space<G>::template Direction<S>;
+    return Space<G>::with_force(mu, pull, at,
+                                sandwich(reverse(motor), Direction::from(f)).components());
+  }
+
   /// From the end on `one` to the end on `two`, world frame.
   template <class System, class Motors>
-  [[nodiscard]] constexpr auto extension(const System& system,
-                                         const Motors& motors) const noexcept {
+  [[nodiscard]] HAMOTOR_INLINE constexpr auto extension(const System& system,
+                                                        const Motors& motors) const noexcept {
     return detail::difference(system.template body<two>().in_world(motors[two], at_two),
                               system.template body<one>().in_world(motors[one], at_one));
   }
