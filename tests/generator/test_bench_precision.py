@@ -99,10 +99,10 @@ def test_a_diagram_without_a_point_is_empty(tmp_path: Path) -> None:
 
 
 def test_translations_have_no_attitude() -> None:
-    one = problem("kepler")
-    library = one.simulation.compile(method="rk4").library
-    with library.start("rk4", step=one.simulation.end, state=one.simulation.state) as live:
-        assert ATTITUDE not in endpoint.of_row(library.description, live.observe())
+    assert endpoint.turns(["s", "e12"])
+    assert endpoint.turns(["s", "e23", "e31", "e12", "e01", "e02", "e03", "e0123"])
+    assert not endpoint.turns(["s", "e01", "e02", "e03"])
+    assert not endpoint.turns(["s", "e1i", "e2i", "e0i"])
 
 
 def test_a_setting_counts_only_if_the_next_two_finer_ones_meet_the_target() -> None:

@@ -25,7 +25,7 @@ def of_row(description: Description, row: Sequence[Any] | NDArray[Any]) -> Endpo
     index = description.column_index
     found: dict[str, Any] = {}
     for body in description.bodies:
-        if has_attitude(description.algebra, description.motor) and _turns(description.motor):
+        if has_attitude(description.algebra, description.motor) and turns(description.motor):
             motor = {b: values[[index[f"{body}.motor.{b}"]]] for b in description.motor}
             found.setdefault(ATTITUDE, []).append(rotation_matrices(motor)[0])
         found.setdefault(POSITION, []).append(values[description.position_columns(body)])
@@ -39,7 +39,7 @@ def of_row(description: Description, row: Sequence[Any] | NDArray[Any]) -> Endpo
     return {name: np.array(value) for name, value in found.items()}
 
 
-def _turns(blades: Sequence[str]) -> bool:
+def turns(blades: Sequence[str]) -> bool:
     """Whether motors with these blades turn anything: translations alone keep every attitude."""
     return sum(not set(blade) & {"0", "i"} for blade in blades) > 1
 
