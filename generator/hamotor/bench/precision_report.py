@@ -8,6 +8,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
+from textwrap import fill
 from typing import Any, Final
 
 from hamotor.bench.endpoint import ATTITUDE
@@ -332,6 +333,7 @@ def write_report(
 _PAGE: Final = Path(__file__).resolve().parents[3] / "templates" / "precision.html"
 _SHOWN: Final = 7
 _COARSEST: Final = 1e-3
+_TITLE: Final = 56
 _MARKERS: Final = "s^vDP"
 _COLOURS: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#7f3c8d")
 _PEERS: Final = {
@@ -388,7 +390,8 @@ def draw(account: Mapping[str, Any], problem: str, files: Sequence[Path]) -> Seq
         ax.set_yscale("log")
     ax.set_xlabel("time of the whole integration, µs (best of the runs; bars to the median)")
     ax.set_ylabel(f"error at the end: {norm}")
-    figure.suptitle(f"{problem}: {account['problems'][problem]['description']}", fontsize=11)
+    title = f"{problem}: {account['problems'][problem]['description']}"
+    ax.set_title(fill(title, _TITLE), loc="left", fontsize=10)  # beside the legend, not over it
     figure.legend(loc="outside right upper", fontsize=8, frameon=False)
     for file in files:
         with whole(file) as unfinished:
