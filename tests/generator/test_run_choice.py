@@ -43,6 +43,7 @@ def test_the_table_speaks_of_known_structures_and_methods_in_order_of_time() -> 
         ("tumble", "free"),
         ("heavy_top", "symmetric"),
         ("spring_pendulum", "asymmetric"),
+        ("magnet", "field"),
         ("planar", "planar"),
         ("two_bodies", "several"),
         ("kirchhoff", "parts"),

@@ -1,6 +1,7 @@
-"""The table that `method = "auto"` reads, from measurements of `bench precision`.
+r"""The table that `method = "auto"` reads, from measurements of `bench precision`.
 
-    python -m hamotor.bench.choice P1 P3 P4 planar two_bodies@2 kirchhoff breathing_body rocket
+    python -m hamotor.bench.choice P1 P3 P4 magnet planar two_bodies@2 kirchhoff \
+        breathing_body rocket
 
 measures these scenes, `NAME@END` to this time (s) instead of the scene's own; accounts that there
 are already, `DIR/precision.json`, are taken as they are.  A problem stands for the structure that
@@ -28,7 +29,7 @@ from hamotor.scene.structure import STRUCTURES, structure_of
 
 _KEPT = 4
 _EXTENT = Extent(3, 2.0, 0.2, 0.05, False, COMPILERS[:1])
-_SPLIT = ("free", "planar", "several", "symmetric", "asymmetric", "parts")
+_SPLIT = ("free", "planar", "several", "symmetric", "asymmetric", "field", "parts")
 _ORDER_WITHOUT_SPLIT = 4
 """Where a step has to be iterated, order 4 costs hardly more than order 2."""
 

@@ -62,11 +62,15 @@ class Flow:
 
 
 def cheapest(system: System) -> tuple[Flow, Recurrence, Quadratic | None]:
-    """The flow whose recurrence is the least work, that recurrence, and its field if quadratic."""
-    found = []
+    """The flow whose recurrence is the least work, that recurrence, and its field if that is
+    quadratic and less work in packs."""
+    found: list[tuple[Flow, Recurrence, Quadratic | None]] = []
     for flow in rigid_flows(system) or [motor_flow(system)]:
         r = recurrence(flow.field)
-        found.append((flow, r, quadratic(r)))
+        found.append((flow, r, None))
+        packed = quadratic(r)
+        if packed is not None:
+            found.append((flow, r, packed))
 
     def work(choice: tuple[Flow, Recurrence, Quadratic | None]) -> int:
         # In the time of one sum: a node of its own costs more, a pack of linear terms half of one

@@ -12,6 +12,7 @@ STRUCTURES = {
     "several": "several rigid bodies in potentials",
     "symmetric": "a symmetric rigid body in potentials: its free motion is known",
     "asymmetric": "an asymmetric rigid body in potentials",
+    "field": "a rigid body in potentials that are neither gravity nor springs",
     "parts": "any group: a kinetic energy in parts whose motion is known, and a potential",
     "general": "any other Hamiltonian or Lagrangian",
     "forced": "forques that no potential has",
@@ -30,6 +31,8 @@ def structure_of(scene: Scene | GeneralScene) -> str:
             return "planar"
         if len(scene.bodies) > 1:
             return "several"
+        if scene.potential is not None:
+            return "field"
         moments = scene.principal[0].moments
         return "symmetric" if len(set(moments)) < len(moments) else "asymmetric"
     if _is_rough(scene):
