@@ -63,7 +63,8 @@ class Witness:
     setting: str
     apart: float
     """The largest difference of a number of the end: a motor's or a rotation matrix's, a momentum
-    or a place in SI units."""
+    or a place in SI units, relative to the largest of its unit where that is above 1 if there are
+    no digits to hold it against."""
 
     def __str__(self) -> str:
         return f"{self.apart:.1e} ({self.method} in {self.scalar}, {self.setting})"
@@ -355,11 +356,11 @@ def _computed(simulation: Simulation) -> Reference:
             (_, row, _), *others = pool.map(
                 lambda run: _end_of(simulation, libraries[run[1]], run[0], run[2]), runs
             )
-        columns = libraries[scalar].description.state_columns()
-        witnesses = []
-        for other, (_, there, setting) in zip(runs[1:], others, strict=True):
-            apart = float(max(abs(Fraction(row[c]) - Fraction(there[c])) for c in columns))
-            witnesses.append(asdict(Witness(other[0], other[1], setting, apart)))
+        description = libraries[scalar].description
+        witnesses = [
+            asdict(Witness(other[0], other[1], setting, _relative(description, row, there)))
+            for other, (_, there, setting) in zip(runs[1:], others, strict=True)
+        ]
         kept = {"row": row, "witnesses": witnesses}
         file.parent.mkdir(parents=True, exist_ok=True)
         write_whole(file, json.dumps(kept))
@@ -373,6 +374,22 @@ def _computed(simulation: Simulation) -> Reference:
             )
     end = endpoint.of_row(compiled(scalar).description, [np.longdouble(x) for x in kept["row"]])
     return Reference(end, source, in_words(found), found)
+
+
+def _relative(description: Description, row: Sequence[str], there: Sequence[str]) -> float:
+    """The largest difference of two rows' states, of numbers above 1 relative to the largest of
+    their unit: an asteroid's momenta are large numbers."""
+    columns = description.state_columns()
+    sizes: dict[str, Fraction] = {}
+    for c in columns:
+        unit = description.columns[c].unit
+        sizes[unit] = max(sizes.get(unit, Fraction(1)), abs(Fraction(row[c])))
+    return float(
+        max(
+            abs(Fraction(row[c]) - Fraction(there[c])) / sizes[description.columns[c].unit]
+            for c in columns
+        )
+    )
 
 
 def _steps(simulation: Simulation) -> int:
