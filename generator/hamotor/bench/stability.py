@@ -94,7 +94,7 @@ class Case(Simulation):
         """The library of a scalar; for those beside double in half the compiler's time."""
         if scalar not in self.compiled:
             names = " ".join(self.by_scalar[scalar])
-            text = self.source("generated", scalar, "taylor")
+            text = self.source("generated", scalar, names)
             text = f'#define HAMOTOR_METHOD "{names}"\n{text}'
             flags = () if scalar == "double" else ("-O1",)
             build = compile_scene(text, scalar=scalar, extra_flags=flags)
