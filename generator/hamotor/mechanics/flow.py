@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -118,6 +118,25 @@ def rigid_flows(system: System) -> list[Flow]:
     return found
 
 
+def inertial(
+    body: Coordinates, symbols: tuple[Expr, ...], rates: Sequence[Expr]
+) -> tuple[Expr, ...]:
+    """ad*_B μ with symbols for the rates, less what cancels among rates that are one multiple of
+    their momenta: P × V, whose products exceed the torques of a body in orbit by all digits."""
+    factors = [sympy.cancel(rate / p) for rate, p in zip(rates, body.momenta, strict=True)]
+    alike = {
+        symbol: factor * p
+        for symbol, factor, p in zip(symbols, factors, body.momenta, strict=True)
+        if factor.is_number and factors.count(factor) > 1
+    }
+    turning = coadjoint(body, symbols)
+    less = [sympy.expand(x.subs(alike)) for x in turning]
+    return tuple(
+        short if len(sympy.Add.make_args(short)) < len(sympy.Add.make_args(x)) else x
+        for x, short in zip(turning, less, strict=True)
+    )
+
+
 def motor_flow(system: System) -> Flow:
     """In the components of motors and momenta, for any group and any H; time and work where H
     knows them."""
@@ -137,7 +156,7 @@ def motor_flow(system: System) -> Flow:
                 (b * x for b, x in zip(symbols, variable.variation, strict=True)), sympy.Integer(0)
             )
             kinds.append((k, "motor", _length(c.name)))
-        turning = coadjoint(body, symbols)
+        turning = inertial(body, symbols, rates)
         for g, momentum, c in zip(generators, body.momenta, turning, strict=True):
             outputs[system.names[momentum]] = c - system.forques[f"forque{k}.{g.momentum}"]
             kinds.append((k, "momentum", _length(g.name)))
@@ -189,13 +208,14 @@ def body_flow(system: System, *, rows: bool) -> Flow:
     for frame in frames:
         body, k = frame.body, frame.number
         b = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in body.group.generators)
+        slopes_of_h = tuple(sympy.diff(energy, p) for p in body.momenta)
         rates += [
-            (s, f"rate{k}_{g.rate}", sympy.diff(energy, p))
-            for s, g, p in zip(b, body.group.generators, body.momenta, strict=True)
+            (s, f"rate{k}_{g.rate}", slope)
+            for s, g, slope in zip(b, body.group.generators, slopes_of_h, strict=True)
         ]
         held = [s for s in frame.variations if s in energy.free_symbols]
         slopes = [(sympy.diff(energy, s), frame.variations[s]) for s in held]
-        turning = coadjoint(body, b)
+        turning = inertial(body, b, slopes_of_h)
         for variable, c in zip(body.motor_variables, body.group.element.components, strict=True):
             if not _length(c.name):
                 motion[variable.symbol] = _dot(b, variable.variation)

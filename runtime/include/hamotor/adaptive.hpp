@@ -12,7 +12,8 @@
 
 namespace hamotor {
 
-/// A pair with an error estimate, in steps that keep it below `tolerance` a unit of time (s⁻¹).
+/// A pair with an error estimate, in steps that keep it below `tolerance` a unit of time (s⁻¹), or
+/// below rounding a step where that is more.
 ///
 /// The steps are the pair's own, whatever times are asked for: a state within the last of them is
 /// interpolated (dense output).  A state that is not the one delivered before, or a time that is
@@ -198,12 +199,12 @@ class Adaptive {
   }
 
   /// One step ahead, of whatever length is accepted; false where none can be that counts beside the
-  /// time and h, or where shorter ones would not be better.
+  /// time and h.
   [[nodiscard]] constexpr bool advance(const System& system, const S& h) noexcept {
     const auto account = method_.account();
     const S least = scalar::Limits<S>::epsilon() * scalar::max_abs(ahead_.time, h);
+    const S least_error = rounding();
     S ratio(0);
-    S allowed(0);  // for the next ratio: what an error as the square of the step would give
     for (bool refused = false;; refused = true) {
       if (!(scalar::abs(proposed_) > least)) {
         return stop(ratio - ratio == S(0) ? Failure::step_too_short : Failure::not_finite);
@@ -212,7 +213,8 @@ class Adaptive {
       method_.do_step(system, next.state, ahead_.time, proposed_);
       next.time = ahead_.time + proposed_;
       ++tried_;
-      ratio = method_.error() / (tolerance_ * scalar::abs(proposed_));
+      const S allowance = tolerance_ * scalar::abs(proposed_);
+      ratio = method_.error() / select(allowance > least_error, allowance, least_error);
       S factor = factor_for(ratio);
       if (ratio <= S(1)) {
         before_ = ahead_;
@@ -223,12 +225,6 @@ class Adaptive {
         return true;
       }
       method_.go_back(account);
-      // Where rounding is all that is estimated, luck would take steps of any length, the time
-      // ahead by next to nothing.
-      if (refused && ratio > allowed && tolerance_ * ratio < rounding(system)) {
-        return stop(Failure::step_too_short);
-      }
-      allowed = factor * ratio;
       proposed_ = factor * proposed_;
     }
   }
@@ -239,18 +235,13 @@ class Adaptive {
     return false;
   }
 
-  /// More than rounding of slopes makes of an error a unit of time, s⁻¹, ahead.
-  [[nodiscard]] constexpr S rounding(const System& system) const noexcept {
-    const Change by = change(system, ahead_.state, ahead_.time);
-    S fastest(0);
-    for (std::size_t i = 0; i < System::bodies; ++i) {
-      fastest = scalar::max_abs(fastest, detail::largest(by.motors[i]));
-      const S size = detail::largest(ahead_.state.momenta[i]);
-      if (size > S(0)) {
-        fastest = scalar::max_abs(fastest, detail::largest(by.momenta[i]) / size);
-      }
+  /// What rounding makes of an error of any step ahead.
+  [[nodiscard]] constexpr S rounding() const noexcept {
+    S size(1);
+    for (const auto& motor : ahead_.state.motors) {
+      size = scalar::max_abs(size, detail::largest(motor));
     }
-    return S(64) * scalar::Limits<S>::epsilon() * fastest;
+    return S(8) * scalar::Limits<S>::epsilon() * size;
   }
 
   constexpr void deliver(const System& system, StateOf<System>& state, const S& target,
