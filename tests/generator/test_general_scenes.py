@@ -698,6 +698,14 @@ def test_the_satellite_librates_at_the_rate_of_the_gravity_gradient() -> None:
     assert 0.93 * small < rate < small
 
 
+def test_a_first_step_is_of_the_motion_and_not_of_metres() -> None:
+    # 7500 m/s are no fast motion at 7e6 m: steps of a fraction of a turn, not of a metre.
+    run = hamotor.load("gravity_gradient").run(method="rkmk4", tolerance=1e-3)
+    steps = [rung["steps"] for rung in run.report["tolerance"]["ladder"]]
+    assert 100 < steps[0] < 4000
+    assert steps[-1] < 40000
+
+
 # ---------------------------------------------------------------------- PGA, CGA, far away
 
 IMAGES = {"s": "s", "e23": "e23", "e31": "e31", "e12": "e12", "e0123": "e123i"}

@@ -324,9 +324,9 @@ def first_step(
 ) -> float:
     """A step to begin a ladder with, seconds: from how fast the initial state changes.
 
-    One very short step gives the fastest relative rate ω of a motor's or a momentum's components;
-    with an error of (h ω)^(order + 1) / 100 a step tolerance^¾ would just be met.  Between 1/256
-    and a quarter of 1/ω, and at least 16 steps.
+    One very short step gives the fastest rate ω of a motor or a momentum relative to its size; with
+    an error of (h ω)^(order + 1) / 100 of that a step tolerance^¾ would just be met, the tolerance
+    relative to the largest motor.  Between 1/256 and a quarter of 1/ω, and at least 16 steps.
     """
     description = library.description
     start = np.asarray(state, dtype=np.float64)
@@ -336,18 +336,19 @@ def first_step(
         if live.advance(1, 1, None) < 1:
             return longest
         rates = np.abs(live.state() - start) / abs(probe)
-    omega = 0.0
+    omega, largest = 0.0, 1.0
     motors, momenta = len(description.motor), len(description.momentum)
     for body in range(len(description.bodies)):
         at = body * (motors + momenta)
-        momentum = slice(at + motors, at + motors + momenta)
-        size = float(np.linalg.norm(start[momentum]))
-        omega = max(omega, float(rates[at : at + motors].max()))
-        if size > 0:
-            omega = max(omega, float(rates[momentum].max()) / size)
+        motor, momentum = slice(at, at + motors), slice(at + motors, at + motors + momenta)
+        largest = max(largest, float(np.linalg.norm(start[motor])))
+        for part in motor, momentum:
+            size = float(np.linalg.norm(start[part]))
+            if size > 0:
+                omega = max(omega, float(rates[part].max()) / size)
     if omega == 0:
         return longest
-    aim = max(tolerance, _REACHABLE) ** _CAUTION
+    aim = max(tolerance / largest, _REACHABLE) ** _CAUTION
     turn: float = (_CONSTANT * aim / max(omega * abs(end), 1.0)) ** (1 / order)
     return min(longest, min(_FIRST_TURN, max(turn, _FIRST_TURN / 64)) / omega)
 
