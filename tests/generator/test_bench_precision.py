@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
 import subprocess
 import sys
+from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -161,10 +163,10 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(
     assert "long runs" in table(account)
     page = (tmp_path / "precision.html").read_text(encoding="utf-8")
     assert not re.findall(r"(?:src|href)=|https?://(?!www\.w3\.org/2000/svg)", page)
-    embedded = re.search(r'type="application/json">(.*?)</script>', page, re.DOTALL)
+    embedded = re.search(r'type="application/gzip">(.*?)</script>', page)
     assert embedded is not None
     written = json.loads((tmp_path / "precision.json").read_text(encoding="utf-8"))
-    assert json.loads(embedded[1]) == written
+    assert json.loads(gzip.decompress(b64decode(embedded[1]))) == written
     assert (tmp_path / "precision_planar.svg").is_file()
 
     def never(*_: Any) -> None:

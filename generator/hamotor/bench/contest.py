@@ -6,7 +6,10 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from fractions import Fraction
 from typing import Any
+
+from hamotor.run.library import in_decimals
 
 GIVEN = "equations generated from the scene"
 """The representation of public solvers where no equations are written for them by hand."""
@@ -122,15 +125,18 @@ class Extent:
     """The only ones; all if empty."""
 
 
-def step_ladder(end: float, extent: Extent) -> list[dict[str, float]]:
-    """Steps, coarse to fine, as a scene's library takes them."""
+def step_ladder(end: float, rungs: float) -> list[dict[str, Any]]:
+    """Steps, coarse to fine, as a scene's library takes them, each `rungs` times the next."""
     counts: list[int] = []
     size = 1.0
     while size < 1e7:
         if not counts or round(size) > counts[-1]:
             counts.append(round(size))
-        size *= extent.rungs
-    return [{"calls": n, "step": end / n, "tolerance": 0.0} for n in counts]
+        size *= rungs
+    return [
+        {"calls": n, "step": end / n, "digits": in_decimals(Fraction(end) / n), "tolerance": 0.0}
+        for n in counts
+    ]
 
 
 def tolerances(extent: Extent, finest: float) -> list[float]:
@@ -139,6 +145,11 @@ def tolerances(extent: Extent, finest: float) -> list[float]:
     while (finer := found[-1] / extent.rungs**4) > finest:
         found.append(finer)
     return found
+
+
+def wide_tolerances(digits: int) -> list[float]:
+    """Those of a scalar that has more than a double, coarse to fine."""
+    return [10.0**-k for k in range(8, digits - 2, 2)]
 
 
 @contextmanager

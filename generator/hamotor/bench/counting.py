@@ -11,10 +11,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from hamotor.run.library import SceneLibrary
+from hamotor.run.library import Failure, SceneLibrary
 
 KINDS: Final = ("additions", "products", "quotients", "roots", "functions")
 _STEPS: Final = 200
+_TRIES: Final = 1000
+"""Steps that are counted, of methods that choose them tries."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +33,8 @@ def work_of(
 ) -> Work | None:
     """The work of `steps` steps, from the first ones; None where they fail.
 
-    A method that chooses its steps does so within as many calls as `setting` says, and is counted
-    from start to end.
+    A method that chooses its steps does so within as many calls as `setting` says, and what it
+    rejects is counted with what it takes.
     """
     counts_of = ctypes.CDLL(str(library.path)).hamotor_counts
     counts = (ctypes.c_int64 * (len(KINDS) + 1))()
@@ -41,11 +43,13 @@ def work_of(
     with library.start(
         method, step=setting["step"], state=state, tolerance=setting["tolerance"] or None
     ) as live:
+        live.set_patience(_TRIES)
         counts_of(counts)
-        done = live.advance(calls, 0, None)
+        live.advance(calls, 0, None)
         taken = live.steps()
         counts_of(counts)
-    if done < calls or not taken:
+        failed = live.failure()[0] is not Failure.NONE
+    if failed or not taken:
         return None
     *operations, evaluations = (count / taken for count in counts)
     return Work(

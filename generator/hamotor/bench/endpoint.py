@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,23 @@ from numpy.typing import NDArray
 from hamotor.run.attitude import has_attitude, rotation_matrices
 from hamotor.run.library import Description
 from hamotor.scene import Scene
+from hamotor.scene.motors import rotation_matrix
 
-Wide = NDArray[np.longdouble]
+Wide = NDArray[Any]
+"""Long doubles, or fractions that hold all digits of a number."""
 Endpoint = Mapping[str, Wide]
 """By quantity with its unit: attitudes (bodies, d, d), everything else (bodies, components)."""
+Number = Callable[[Any], Any]
+"""`np.longdouble` or `Fraction`, of doubles or decimals."""
 
 ATTITUDE, POSITION, ENERGY = "attitude (rad)", "position (m)", "energy (J)"
 
 
-def of_row(description: Description, row: Sequence[Any] | NDArray[Any]) -> Endpoint:
+def of_row(
+    description: Description, row: Sequence[Any] | NDArray[Any], number: Number = np.longdouble
+) -> Endpoint:
     """The end that a scene's row of columns holds."""
-    values = np.asarray(row, dtype=np.longdouble)
+    values = np.array([number(value) for value in row])
     index = description.column_index
     found: dict[str, Any] = {}
     for body in description.bodies:
@@ -44,38 +51,34 @@ def turns(blades: Sequence[str]) -> bool:
     return sum(not set(blade) & {"0", "i"} for blade in blades) > 1
 
 
-def of_quaternion(scene: Scene, state: Sequence[Any], energy: Any = None) -> Endpoint:
+def of_quaternion(
+    scene: Scene, state: Sequence[Any], energy: Any = None, number: Number = np.longdouble
+) -> Endpoint:
     """The end of a single body, from quaternion, body rates, and position and velocity if any.
 
     Numbers may be decimal strings of any length.  Without `energy` it is computed from the state
-    where that holds all of it.
+    where that holds all of it; not from fractions.
     """
-    x = np.array([np.longdouble(value) for value in state])
+    x = np.array([number(value) for value in state])
     (body,) = scene.bodies
     rotation = _rotation(x[:4])
-    moments = np.array(body.kinetic_matrix[:3, :3], dtype=np.longdouble)
+    moments = np.array([[number(m) for m in row] for row in body.kinetic_matrix[:3, :3]])
     momentum = moments @ x[4:7]
     found = {ATTITUDE: rotation[None], "momentum (kg m^2/s)": momentum[None]}
     if len(x) == 13:
         found[POSITION] = x[None, 7:10]
-        found["momentum (kg m/s)"] = (body.mass * rotation.T @ x[10:13])[None]
+        found["momentum (kg m/s)"] = (number(body.mass) * rotation.T @ x[10:13])[None]
     if energy is not None:
-        found[ENERGY] = np.array([[np.longdouble(energy)]])
+        found[ENERGY] = np.array([[number(energy)]])
     elif len(x) == 13 or not body.group.translates:
         found[ENERGY] = np.array([[_energy(scene, rotation, momentum, x)]])
     return found
 
 
 def _rotation(q: Wide) -> Wide:
-    size = np.sqrt(q @ q)
-    w, i, j, k = q / size if size > 0 else np.full(4, np.nan)
-    return np.array(
-        [
-            [1 - 2 * (j * j + k * k), 2 * (i * j - w * k), 2 * (i * k + w * j)],
-            [2 * (i * j + w * k), 1 - 2 * (i * i + k * k), 2 * (j * k - w * i)],
-            [2 * (i * k - w * j), 2 * (j * k + w * i), 1 - 2 * (i * i + j * j)],
-        ]
-    )
+    square = q @ q
+    w, i, j, k = q
+    return rotation_matrix([w, -i, -j, -k]) / (square if square > 0 else np.nan)
 
 
 def _energy(scene: Scene, rotation: Wide, momentum: Wide, x: Wide) -> Any:
@@ -100,12 +103,24 @@ def errors(found: Endpoint, reference: Endpoint) -> dict[str, float]:
     for name, here in found.items():
         if name not in reference:
             continue
-        there = reference[name]
+        apart = (here - reference[name]).astype(np.longdouble)
         if name == ATTITUDE:
             # |R1 - R2| = 2 √2 sin α/2 keeps its digits at small angles.
-            chord = np.sqrt(np.sum((here - there) ** 2, axis=(-2, -1)) / 8)
+            chord = np.sqrt(np.sum(apart**2, axis=(-2, -1)) / 8)
             distance = 2 * np.arcsin(np.clip(chord, 0, 1))
         else:
-            distance = np.sqrt(np.sum((here - there) ** 2, axis=-1))
+            distance = np.sqrt(np.sum(apart**2, axis=-1))
         distances[name] = float(distance.max())
     return distances
+
+
+def in_long_doubles(end: Endpoint) -> Endpoint:
+    """An end of fractions, rounded."""
+
+    def rounded(x: Fraction) -> Any:
+        return np.longdouble(float(x)) + np.longdouble(float(x - Fraction(float(x))))
+
+    return {
+        name: np.array([rounded(x) for x in value.flat]).reshape(value.shape)
+        for name, value in end.items()
+    }

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, replace
 from fractions import Fraction
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, Final
 
@@ -40,6 +40,7 @@ from hamotor.bench.contest import (
     environment,
     step_ladder,
     tolerances,
+    wide_tolerances,
 )
 from hamotor.bench.counting import work_of
 from hamotor.bench.drift import SAMPLES, Conserved, Drift, drifts, of_method, step_of
@@ -48,6 +49,7 @@ from hamotor.bench.precision_report import (
     ahead,
     coverage,
     leaders,
+    more_digits,
     over_problems,
     rules,
     standings,
@@ -58,11 +60,11 @@ from hamotor.bench.problems import GOALS, TARGETS, Problem, default_problems, ow
 from hamotor.errors import HamotorError, ToolError, UsageError
 from hamotor.files import write_whole
 from hamotor.run.build import default_cache, find_compiler, flags_for
-from hamotor.run.library import SceneLibrary
+from hamotor.run.library import SceneLibrary, in_decimals
 from hamotor.run.report import to_json
 from hamotor.run.simulation import Compiled, Simulation, load
 from hamotor.scene import METHODS
-from hamotor.scene.scalars import COUNTED
+from hamotor.scene.scalars import COUNTED, Scalar
 
 COMPILERS: Final = ("g++", "clang++")
 _FORMS: Final = (
@@ -72,7 +74,7 @@ _FORMS: Final = (
     (Form(algebra="conformal"), ("rkmk4", "rk4", "rkmk87", "gauss6", "taylor")),
     (Form(scalar="float"), ("rkmk4", "splitting4", "gauss6")),
     (Form(scalar="long_double"), ("splitting8", "gauss8")),
-    (Form(scalar="quad"), ("rkmk87", "splitting10", "gauss16", "taylor")),
+    (Form(scalar="quad"), ("rk87", "splitting10", "gauss16", "taylor", "closed_form")),
 )
 """Kernels, representation, algebra and scalar beside the generated ones in double, with methods."""
 
@@ -86,6 +88,9 @@ _TYPICAL_S: Final = {"whole": 100.0, "part": 40.0, "quick": 35.0}
 _LONG_RUNS: Final = 12.0
 """How many times as long as one of a problem's long runs may take all of them take."""
 
+
+_WIDE_S: Final = 0.5
+"""What a setting of a scalar with more digits than a double may take."""
 
 _THE_SAME_WORK: Final = ("rk", "cf", "splitting")
 """Methods whose steps take as many operations in any scalar."""
@@ -272,6 +277,7 @@ def _account(
     return {
         **account,
         "best": best,
+        "more_digits": more_digits(account),
         "over_problems": over_problems(best),
         "coverage": coverage(account),
     }
@@ -501,25 +507,30 @@ def _scenes(
                 failure=built,
             )  # fmt: skip
         description = built.description
-        controlled = method in description.error_controlled
+        if method in description.error_controlled:
+            wide = wide_tolerances(description.digits)
+            allowed = wide if description.is_wide else tolerances(extent, 1e-18)
+            (whole,) = step_ladder(simulation.end, inf)
+            settings = [{**whole, "tolerance": tolerance} for tolerance in allowed]
+        else:
+            rungs = extent.rungs**2 if description.is_wide else extent.rungs
+            settings = step_ladder(simulation.end, rungs)
         return Contestant(
             problem=one.name,
             name=method,
             family="hamotor",
             compiler=compiler,
             kind="scene",
-            settings=[
-                {"calls": 1, "step": simulation.end, "tolerance": t}
-                for t in tolerances(extent, 1e-18)
-            ]
-            if controlled
-            else step_ladder(simulation.end, extent),
-            longest_s=extent.longest_s,
+            settings=settings,
+            longest_s=_WIDE_S if description.is_wide else extent.longest_s,
             form=form,
             said={
                 "library": str(built.build.library),
                 "method": method,
                 "state": [float(x) for x in simulation.state],
+                "digits": " ".join(map(in_decimals, simulation.exact_state))
+                if description.is_wide
+                else "",
                 "columns": len(description.columns),
                 "description": description,
             },
@@ -563,7 +574,7 @@ def _together(
 
 def _in_form(one: Problem, form: Form) -> Simulation | None:
     if not form.algebra:
-        return one.simulation
+        return one.wide if Scalar(form.scalar).is_wide else one.simulation
     return None if isinstance(one.conformal, str) else one.conformal.simulation
 
 
@@ -730,14 +741,18 @@ def _row(
     )
     if row.failure is not None:
         return row
-    if not all(map(isfinite, said["final"])):
+    if not all(isfinite(float(x)) for x in said["final"]):
         return replace(row, failure="not finite at the end")
     with np.errstate(all="ignore"):  # a run that exploded may leave what a double holds
-        if contestant.is_ours:
+        there = one.reference.end
+        if contestant.said.get("digits"):
+            there = one.reference.exact
+            found = endpoint.of_row(contestant.said["description"], said["final"], Fraction)
+        elif contestant.is_ours:
             found = endpoint.of_row(contestant.said["description"], said["final"])
         else:
             found = one.end_of_peer(said["final"], observed_by)
-        errors = endpoint.errors(found, one.reference.end)
+        errors = endpoint.errors(found, there)
     work = None
     if contestant.counted is not None:
         state = contestant.said["state"]

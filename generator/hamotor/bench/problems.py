@@ -74,11 +74,17 @@ class Witness:
 class Reference:
     """The exact end of a problem, as far as it is known."""
 
-    end: Endpoint
+    exact: Endpoint
+    """In fractions."""
     source: str
     certificate: str
     """How it was checked, and to what."""
     witnesses: tuple[Witness, ...] = ()
+
+    @cached_property
+    def end(self) -> Endpoint:
+        """In long doubles."""
+        return endpoint.in_long_doubles(self.exact)
 
 
 @dataclass(frozen=True)
@@ -104,15 +110,19 @@ class Problem:
     @cached_property
     def reference(self) -> Reference:
         """From `tests/references`, or else computed in 50 digits and again in quad."""
-        file = REFERENCES / f"{self.name}.json"
-        if file.is_file() and isinstance(self.scene, Scene) and not self._is_cut:
-            return _from_digits(file, self)
-        return _computed(self.simulation)
+        return _from_digits(self._digits, self) if self._digits else _computed(self.simulation)
 
     @property
-    def _is_cut(self) -> bool:
-        """Whether it ends elsewhere than its scene."""
-        return bool(self.simulation.end != self.scene.time.end)
+    def _digits(self) -> Path | None:
+        """The file that holds the digits of its end, if the scene is not cut."""
+        file = REFERENCES / f"{self.name}.json"
+        whole = isinstance(self.scene, Scene) and self.simulation.end == self.scene.time.end
+        return file if whole and file.is_file() else None
+
+    @cached_property
+    def wide(self) -> Simulation:
+        """What scalars with more digits than a double step: the motion of the reference."""
+        return _as_doubles(self) if self._digits else self.simulation
 
     @cached_property
     def norm(self) -> str:
@@ -245,7 +255,7 @@ def _from_digits(file: Path, one: Problem) -> Reference:
     state = [*last["q"], *last["w"], *last.get("x", ()), *last.get("v", ())]
     _, witnesses = witnesses_of(one, said)
     return Reference(
-        endpoint.of_quaternion(scene, state, said["energy0"]),
+        endpoint.of_quaternion(scene, state, said["energy0"], Fraction),
         f"tests/references/{file.name}: {said['method'].split(';')[0]}",
         f"two orders, differing by {said['crosscheck_max_abs_diff']}; " + in_words(witnesses),
         witnesses,
@@ -260,7 +270,7 @@ def in_words(witnesses: Sequence[Witness]) -> str:
 def witnesses_of(one: Problem, said: Mapping[str, Any]) -> tuple[str, tuple[Witness, ...]]:
     """Runs of ours beside a reference of digits: those that are kept, if the scene and the runs are
     still what the key says, or else new ones."""
-    simulation = _as_doubles(one)
+    simulation = one.wide
     runs: list[tuple[str, str, float]] = list(_SERIES)
     other = "closed_form" if "closed_form" in simulation.methods else "gauss16"
     runs.append((other, "quad", 0.0))
@@ -372,7 +382,7 @@ def _computed(simulation: Simulation) -> Reference:
                 f"{simulation.name}: {source} and another run differ by {witness}, so that there is"
                 " no reference. The motion is chaotic or not smooth: end it earlier."
             )
-    end = endpoint.of_row(compiled(scalar).description, [np.longdouble(x) for x in kept["row"]])
+    end = endpoint.of_row(compiled(scalar).description, kept["row"], Fraction)
     return Reference(end, source, in_words(found), found)
 
 

@@ -279,7 +279,7 @@ def contestants(
             )
         )  # fmt: skip
 
-    steps = [float(s["calls"]) for s in step_ladder(1.0, extent)]
+    steps = [float(s["calls"]) for s in step_ladder(1.0, extent.rungs)]
     for compiler, family, library, names in libraries(compilers, peers, gaps, equations):
         for solver in names:
             options: Mapping[str, Any] = {"library": library, "solver": solver}

@@ -293,7 +293,7 @@ class SceneLibrary:
             )
         check_method(method, self.description.methods)
         if self.description.is_wide:
-            numbers = " ".join(map(_decimal, (0.0, step, *state)))
+            numbers = " ".join(map(in_decimals, (0.0, step, *state)))
             handle = self._c.hamotor_start_text(method.encode(), tolerance or 0.0, numbers.encode())
         else:
             handle = self._c.hamotor_start(
@@ -495,10 +495,11 @@ class LiveRun:
 
 
 _LONGEST_NUMBER = 128
-_DIGITS = 62  # more than any scalar has
+_DIGITS = 62
 
 
-def _decimal(x: float | Fraction) -> str:
+def in_decimals(x: float | Fraction) -> str:
+    """`x` with more digits than any scalar has."""
     exact = Fraction(x)
     context = Context(prec=_DIGITS, Emin=-99999, Emax=99999)
     return str(context.divide(Decimal(exact.numerator), Decimal(exact.denominator)))

@@ -132,7 +132,7 @@ class Result:
     """What one setting gave: times of each repetition, the last state, what it took."""
 
     def __init__(
-        self, watch: Watch, state: Vector, steps: int | None, evaluations: int | None
+        self, watch: Watch, state: Sequence[Any], steps: int | None, evaluations: int | None
     ) -> None:
         self.seconds, self.processor, self.state = watch.seconds, watch.processor, state
         self.steps, self.evaluations = steps, evaluations

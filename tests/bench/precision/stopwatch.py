@@ -35,16 +35,23 @@ Worth = Callable[[], Iterable[tuple[int, int]]]
 
 
 class CompiledScene:
-    """A scene's library with one method; settings are {calls, step, tolerance}."""
+    """A scene's library with one method; settings are {calls, step, its digits, tolerance}.
+
+    A scalar with more digits than a double starts from `digits` and is read in all of them.
+    """
 
     set_up_s = 0.0
 
     def __init__(self, setting: Mapping[str, Any], said: Mapping[str, Any], loop: str) -> None:
         scene = ctypes.CDLL(said["library"])
-        self._functions = [
-            ctypes.cast(getattr(scene, f"hamotor_{name}"), ctypes.c_void_p)
+        self._functions: dict[str, Any] = {
+            name: ctypes.cast(getattr(scene, f"hamotor_{name}"), ctypes.c_void_p)
             for name in ("start", "advance", "observe", "steps", "stop")
-        ]
+        }
+        self._wide: WideScene | None = None
+        if said["digits"]:
+            self._wide = WideScene(scene, f"0 {setting['digits']} {said['digits']}")
+            self._functions |= {"start": self._wide.start, "observe": self._wide.observe}
         self._scene = scene
         self._time = ctypes.CDLL(loop).time_runs
         self._time.restype = ctypes.c_int64
@@ -59,7 +66,7 @@ class CompiledScene:
         steps = ctypes.c_int64()
         calls = int(self._setting["calls"])
         done = self._time(
-            *self._functions, self._method, ctypes.c_double(self._setting["step"]),
+            *self._functions.values(), self._method, ctypes.c_double(self._setting["step"]),
             ctypes.c_double(self._setting["tolerance"]), self._state, ctypes.c_int64(calls),
             ctypes.c_int64(repetitions), seconds, processor, row, ctypes.byref(steps),
         )  # fmt: skip
@@ -67,7 +74,35 @@ class CompiledScene:
             raise peers.Refused(f"not finite after {done} of {calls} steps")
         watch = peers.Watch()
         watch.seconds, watch.processor = list(seconds), list(processor)
-        return peers.Result(watch, list(row), steps.value, None)
+        final = self._wide.last if self._wide else list(row)
+        return peers.Result(watch, final, steps.value, None)
+
+
+class WideScene:
+    """`start` and `observe` by decimals, for a scalar with more digits than a double."""
+
+    def __init__(self, scene: ctypes.CDLL, numbers: str) -> None:
+        start, observe = scene.hamotor_start_text, scene.hamotor_observe_text
+        start.restype = ctypes.c_void_p
+        start.argtypes = [ctypes.c_char_p, ctypes.c_double, ctypes.c_char_p]
+        observe.restype = ctypes.c_int64
+        observe.argtypes = [ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int64]
+        self.last: list[str] = []
+
+        def started(method: bytes, _: float, __: float, tolerance: float, ___: int) -> int:
+            handle: int = start(method, tolerance, numbers.encode())
+            return handle
+
+        def observed(run: int, _: int) -> None:
+            text = ctypes.create_string_buffer(observe(run, None, 0) + 1)
+            observe(run, text, len(text))
+            self.last = text.value.decode().split()
+
+        pointer, number = ctypes.c_void_p, ctypes.c_double
+        self.start = ctypes.CFUNCTYPE(pointer, ctypes.c_char_p, number, number, number, pointer)(
+            started
+        )
+        self.observe = ctypes.CFUNCTYPE(None, pointer, pointer)(observed)
 
 
 class Entry:

@@ -81,6 +81,7 @@ void adams(const Rates& rates, State<Rates::size>& x, double end, double toleran
   check(CVodeSetNonlinearSolver(memory, iteration));
   check(CVodeSetMaxNumSteps(memory, most_steps));
   check(CVodeSetMaxHnilWarns(memory, -1));
+  check(CVodeSetErrFile(memory, nullptr));  // what fails is a row
   check(CVodeSetStopTime(memory, end));
   double reached = 0;
   check(CVode(memory, end, state, &reached, CV_NORMAL));
@@ -103,6 +104,7 @@ void runge_kutta(const Rates& rates, State<Rates::size>& x, double end, double t
   check(ERKStepSetOrder(memory, order));
   check(ERKStepSetMaxNumSteps(memory, most_steps));
   check(ERKStepSetMaxHnilWarns(memory, -1));
+  check(ERKStepSetErrFile(memory, nullptr));
   check(ERKStepSetStopTime(memory, end));
   double reached = 0;
   check(ERKStepEvolve(memory, end, state, &reached, ARK_NORMAL));
