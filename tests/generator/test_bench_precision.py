@@ -10,6 +10,7 @@ import sys
 from base64 import b64decode
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from hamotor.bench.problems import (
 )
 from hamotor.bench.summary import summary
 from hamotor.errors import UsageError
+from hamotor.run.library import SceneLibrary
 from hamotor.scene import bundled_scenes
 
 
@@ -136,7 +138,7 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(
     library = simulation.compile(method="splitting8").library
     with library.start("splitting8", step=simulation.end / 4000, state=simulation.state) as live:
         live.advance(4000, 0, None)
-        end = endpoint.of_row(library.description, live.observe())
+        end = endpoint.of_row(library.description, live.observe(), Fraction)
     vars(one)["reference"] = Reference(end, "splitting8", "none")  # one in quad takes a minute
     extent = Extent(
         2, 2.0, 0.001, 0.01, forms=False, compilers=("g++",), drift=20_000, counted=True
@@ -181,6 +183,25 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(
     assert both["not_there"]["other"] == "no reference"
     with pytest.raises(UsageError, match="no reference"):
         measure([one], replace(extent, rounds=3), {}, {}, tmp_path)
+
+
+@pytest.mark.slow
+def test_quad_is_measured_in_all_its_digits(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = problem("planar")
+    monkeypatch.setattr(precision, "_FORMS", ((Form(scalar="quad"), ("splitting10",)),))
+    extent = Extent(0, 2.0, 0.01, 0.01, forms=True, compilers=("g++",), methods=("none",))
+    ((wide,), _) = precision._scenes(one, "g++", extent)
+    library = SceneLibrary(Path(wide.said["library"]))
+    step = Fraction(one.simulation.end) / 16384
+    with library.start("splitting10", step=step, state=one.simulation.exact_state) as live:
+        live.advance(16384, 0, None)
+        end = endpoint.of_row(library.description, live.observe_text(), Fraction)
+    vars(one)["reference"] = Reference(end, "splitting10", "none")
+    settings = [s for s in wide.settings if s["calls"] in (1024, 4096)]
+    rows = precision._times(one, [replace(wide, settings=settings)], extent)
+    coarse, fine = (row.errors[POSITION] for row in rows)
+    assert fine < 1e-18
+    assert 4**9.9 < coarse / fine < 4**10.1
 
 
 def _refused(*_: Any) -> None:
