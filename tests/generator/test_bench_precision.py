@@ -24,7 +24,7 @@ from hamotor.bench.contest import Contestant, Extent, Form, Row
 from hamotor.bench.drift import _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
-from hamotor.bench.precision_report import best, coverage, draw, over_problems, table
+from hamotor.bench.precision_report import best, coverage, draw, more_digits, over_problems, table
 from hamotor.bench.problems import (
     REFERENCES,
     Problem,
@@ -89,7 +89,8 @@ def _rows(errors: Sequence[float], microseconds: Sequence[float]) -> list[Mappin
     return [
         {
             "problem": "p", "contestant": "m", "family": "hamotor", "form": "", "compiler": "",
-            "failure": None, "errors": {ATTITUDE: e}, "best_us": t,
+            "failure": None, "errors": {ATTITUDE: e},
+            **{f"{of}_us": t for of in ("best", "median", "worst", "cpu")},
         }
         for e, t in zip(errors, microseconds, strict=True)
     ]  # fmt: skip
@@ -250,19 +251,22 @@ def test_the_readme_says_what_the_account_does() -> None:
         rows += ladder(name, "gauss6", "hamotor", 30.0)
         rows += ladder(name, "heyoka", "heyoka", 20.0)
     rows += ladder("P1", "closed_form", "hamotor", 2.0)
-    said = {"norm": ATTITUDE, "end_s": 5.0}
-    account = {
+    wide = [{**row, "form": "quad", "compiler": "g++"} for row in _rows([1e-21] * 3, [4e4] * 3)]
+    rows += [{**row, "problem": "P1", "contestant": "taylor"} for row in wide]
+    said = {"norm": ATTITUDE, "end_s": 5.0, "goals": []}
+    account: dict[str, Any] = {
         "targets": [1e-4, 1e-6],
         "problems": dict.fromkeys(readme.SHOWN, said),
         "rows": rows,
         "provenance": {"processor": "one"},
     }
-    text = readme.text(account)
+    text = readme.text({**account, "more_digits": more_digits(account)})
     assert "| spring, 5 s | 10 / 20 | none / none |" in text
     assert "| free, 5 s | 2 / 20 | none / none |" in text
     assert "Without the closed form the free body takes us 0.5 times as long" in text
     assert "splittings take 4 times as long as the fastest public solver" in text
     assert "Gauss collocation takes 3 to 15 times as long as the fastest of ours" in text
+    assert text.endswith("in quad: free 1e-16 in 40 ms (taylor) and 1e-20 in 40 ms (taylor).")
 
 
 def test_what_is_no_problem_is_told_the_benchmarks_own() -> None:

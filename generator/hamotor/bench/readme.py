@@ -137,6 +137,21 @@ def reading(account: Mapping[str, Any]) -> list[str]:
     return said
 
 
+def beyond_doubles(account: Mapping[str, Any]) -> str:
+    """What errors cost that only scalars with more digits reach; "" where none does."""
+    said = []
+    for name, word in SHOWN.items():
+        ways = [
+            f"{found['target']:.0e} in {brief(found['ours']['us'] / 1000, 2)} ms "
+            f"({found['ours']['name'].partition(' ')[0]})"
+            for found in account["more_digits"]
+            if found["problem"] == name
+        ]
+        if ways:
+            said.append(f"{word} {' and '.join(dict.fromkeys([ways[0], ways[-1]]))}")
+    return f"Beyond a double, in quad: {'; '.join(said)}." if said else ""
+
+
 def text(account: Mapping[str, Any]) -> str:
     """The README's section."""
     lines = []
@@ -157,7 +172,8 @@ def text(account: Mapping[str, Any]) -> str:
         "two finer settings are as good (one process, best of the runs, "
         f"{account['provenance']['processor']}; compilation not counted):"
     )
-    return "\n".join([*lines, measured, "", *table(account), "", " ".join(reading(account))])
+    read = " ".join([*reading(account), beyond_doubles(account)]).strip()
+    return "\n".join([*lines, measured, "", *table(account), "", read])
 
 
 def main(arguments: Sequence[str]) -> int:
