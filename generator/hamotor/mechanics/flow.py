@@ -16,7 +16,7 @@ from hamotor.codegen.program import Program
 from hamotor.codegen.taylor import PACK, Quadratic, Recurrence, quadratic, recurrence
 from hamotor.mechanics.body_frame import BodyFrame, Rewriting, Unsuitable
 from hamotor.mechanics.coordinates import Coordinates, Expr
-from hamotor.mechanics.hamiltonian import TIME, Hamiltonian, coadjoint
+from hamotor.mechanics.hamiltonian import TIME, Hamiltonian, inertial
 from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import Definition, System, folded, gradient_symbols
 
@@ -116,25 +116,6 @@ def rigid_flows(system: System) -> list[Flow]:
     with suppress(Unsuitable):
         found.append(world_flow(system))
     return found
-
-
-def inertial(
-    body: Coordinates, symbols: tuple[Expr, ...], rates: Sequence[Expr]
-) -> tuple[Expr, ...]:
-    """ad*_B μ with symbols for the rates, less what cancels among rates that are one multiple of
-    their momenta: P × V, whose products exceed the torques of a body in orbit by all digits."""
-    factors = [sympy.cancel(rate / p) for rate, p in zip(rates, body.momenta, strict=True)]
-    alike = {
-        symbol: factor * p
-        for symbol, factor, p in zip(symbols, factors, body.momenta, strict=True)
-        if factor.is_number and factors.count(factor) > 1
-    }
-    turning = coadjoint(body, symbols)
-    less = [sympy.expand(x.subs(alike)) for x in turning]
-    return tuple(
-        short if len(sympy.Add.make_args(short)) < len(sympy.Add.make_args(x)) else x
-        for x, short in zip(turning, less, strict=True)
-    )
 
 
 def motor_flow(system: System) -> Flow:
@@ -312,14 +293,10 @@ def world_flow(system: System) -> Flow:
             if not _length(c.name):
                 motion[variable.symbol] = _dot(b, variable.variation).subs(still)
                 kinds[variable.symbol] = k, "motor", 0
-        # P × V is zero, V being a multiple of P.
-        turning = coadjoint(body, b)
-        gone = still | {
-            m: sympy.Integer(0) for m, moving in zip(body.momenta, moves, strict=True) if moving
-        }
+        turning = inertial(body, b, h.rates[k])
         for i, (momentum, g) in enumerate(zip(body.momenta, generators, strict=True)):
             if not moves[i]:
-                motion[momentum] = turning[i].subs(gone) - system.forques[f"forque{k}.{g.momentum}"]
+                motion[momentum] = turning[i] - system.forques[f"forque{k}.{g.momentum}"]
                 kinds[momentum] = k, "momentum", 0
         forces = [sympy.Integer(0) for _ in d]
         for n, _ in enumerate(h.gradients(body), 1):

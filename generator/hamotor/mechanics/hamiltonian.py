@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -155,10 +155,32 @@ class Hamiltonian:
                 raise ValueError(f"H is not constant on {body.group.name}: {work}")
 
 
-def coadjoint(body: Coordinates, rate: tuple[Expr, ...]) -> tuple[Expr, ...]:
+def coadjoint(body: Coordinates, rate: Sequence[Expr]) -> tuple[Expr, ...]:
     """ad*_B μ: component i is μ([B, E_i])."""
+    return _bracketed(body, rate, [None] * len(body.momenta))
+
+
+def inertial(
+    body: Coordinates, symbols: Sequence[Expr], rates: Sequence[Expr]
+) -> tuple[Expr, ...]:
+    """ad*_B μ of the rates, in symbols for them, less what cancels among those that are one
+    multiple of their momenta: P × V of V = P/m, whose products exceed the torques of a body in
+    orbit by all digits."""
+    ratios = [sympy.expand(rate / p) for rate, p in zip(rates, body.momenta, strict=True)]
+    return _bracketed(body, symbols, ratios)
+
+
+def _bracketed(
+    body: Coordinates, rate: Sequence[Expr], ratios: Sequence[Expr | None]
+) -> tuple[Expr, ...]:
+    """Σ c_jik B_j μ_k without those pairs that cancel where B_j : μ_j = B_k : μ_k."""
     structure = body.group.structure
     size = range(len(body.momenta))
+
+    def stays(i: int, j: int, k: int) -> bool:
+        alike = ratios[j] is not None and ratios[j] == ratios[k]
+        return not (alike and structure[j][i][k] + structure[k][i][j] == 0)
+
     return tuple(
         sum(
             (
@@ -167,7 +189,7 @@ def coadjoint(body: Coordinates, rate: tuple[Expr, ...]) -> tuple[Expr, ...]:
                 * body.momenta[k]
                 for j in size
                 for k in size
-                if structure[j][i][k]
+                if structure[j][i][k] and stays(i, j, k)
             ),
             sympy.Integer(0),
         )

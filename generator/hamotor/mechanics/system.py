@@ -10,7 +10,7 @@ import sympy
 
 from hamotor.codegen.program import Program
 from hamotor.mechanics.coordinates import Coordinates, Expr
-from hamotor.mechanics.hamiltonian import TIME, Hamiltonian
+from hamotor.mechanics.hamiltonian import TIME, Hamiltonian, coadjoint, inertial
 from hamotor.mechanics.straightline import straight_line
 
 Definition = tuple[Expr, str, Expr]
@@ -108,6 +108,23 @@ class System:
     def forque(self) -> Program:
         """F of every body: outputs `forque{k}.NAME`."""
         return self._program(self.forques, self.pulls)
+
+    @cached_property
+    def inertial(self) -> Program | None:
+        """ad*_B μ of every body without what cancels in it, in its rates `rate{k}.NAME` and its
+        momenta: outputs `inertial{k}.NAME`.  None where nothing does."""
+        h = self.hamiltonian
+        outputs, names, cancels = {}, dict(self.names), False
+        for k, (body, rates) in enumerate(zip(h.bodies, h.rates, strict=True)):
+            generators = body.group.generators
+            symbols = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in generators)
+            names |= {s: f"rate{k}.{g.rate}" for s, g in zip(symbols, generators, strict=True)}
+            left = inertial(body, symbols, rates)
+            cancels |= left != coadjoint(body, symbols)
+            outputs |= {
+                f"inertial{k}.{g.momentum}": x for g, x in zip(generators, left, strict=True)
+            }
+        return straight_line(outputs, names) if cancels else None
 
     @cached_property
     def _rates(self) -> dict[str, Expr]:

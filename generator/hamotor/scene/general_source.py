@@ -95,6 +95,7 @@ def general_source(
         own_system = _lagrangian(scene.lagrangian, group_type, by_name)
     else:
         own_system = _hamiltonian(scene, system)
+        own_system["inertial"] = None if by_name else _inertial(scene, system)
         split = not (drawn and scene.draws_rates)
         own_system["parts"] = _parts(scene, system, by_name) if split else None
     place = [*(first.position if first.space.affine else first.at((0,) * first.dimension))]
@@ -227,6 +228,27 @@ def _hamiltonian(scene: GeneralScene, system: System) -> dict[str, Any]:
     }
 
 
+def _inertial(scene: GeneralScene, system: System) -> dict[str, Any] | None:
+    """[μ, B] without what vanishes in it, for the template; None where all of it stays.
+
+    By tables it stays as it is: they are to compare with.
+    """
+    if system.inertial is None:
+        return None
+    program = ProgramText(system.inertial)
+    velocities = {
+        f"rate{k}.{g.rate}"
+        for k, body in enumerate(scene.bodies)
+        for g, length in zip(body.coordinates.group.generators, scene.group.lengths, strict=True)
+        if length
+    }
+    return {
+        "program": program,
+        "outputs": program.outputs("inertial", len(scene.bodies)),
+        "along": velocities.isdisjoint(program.used),
+    }
+
+
 def _parts(scene: GeneralScene, system: System, by_name: bool) -> dict[str, Any] | None:
     """The known motions of a kinetic energy, for the template; by_name: by the group's own exp."""
     if scene.parts is None:
@@ -298,7 +320,7 @@ def _lagrangian(lagrangian: Lagrangian, group_type: str, by_name: bool) -> dict[
     """The system of an L whose rates are found by Newton's method, for the template."""
     values = LagrangianSystem(lagrangian).template_values()
     text = rendered("lagrangian.cpp.jinja", group_type=group_type, by_name=by_name, **values)
-    return {"lagrangian": text, "parts": None}
+    return {"lagrangian": text, "parts": None, "inertial": None}
 
 
 def motor_unit(scene: GeneralScene, blade: str) -> str:

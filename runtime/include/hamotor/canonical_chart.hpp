@@ -378,11 +378,9 @@ class CanonicalChart {
   /// What of a rate turns the frame in which m is seen.
   [[nodiscard]] static Rate turn_of(const Rate& x) noexcept { return group.template part<true>(x); }
 
-  /// ṁ where nothing acts on a body of momentum μ, body frame, that moves by B: −V × P.
-  [[nodiscard]] static Momentum coupling(const Rate& b, const Momentum& mu) noexcept
-    requires(translates)
-  {
-    return coadjoint(group.template part<false>(b), mu);
+  /// And what does not.
+  [[nodiscard]] static Rate shift_of(const Rate& x) noexcept {
+    return group.template part<false>(x);
   }
 
  private:

@@ -63,7 +63,7 @@ class Gauss {
   static constexpr auto dimension = static_cast<std::size_t>(G::dimension);
   static constexpr std::size_t positions = n * dimension;
   /// Whether P × V turns the spin.
-  static constexpr bool has_coupling = Chart::translates && !PrincipalSystem<System>;
+  static constexpr bool has_coupling = Chart::translates && !moves_along_momentum<System>;
   /// Whether momenta are unknowns too.
   static constexpr bool has_push = System::has_forque || has_coupling;
   static constexpr std::size_t unknowns = has_push ? 2 * positions : positions;
@@ -141,7 +141,7 @@ class Gauss {
 
   /// The first guess where nothing is known: what is at the start.
   constexpr void stay(const System& system, const StateOf<System>& state, const S& t) noexcept {
-    gradients_.fill(numbers(state, gradient(system, state, t)));
+    gradients_.fill(numbers(system, state, gradient(system, state, t)));
   }
 
   /// The first guess after a step of the same length: its polynomials, gone on.
@@ -264,7 +264,7 @@ class Gauss {
       seen.state.momenta[i] = charts[i].body_momentum(m[i]);
     }
     const auto now = hamotor::gradient(system, seen.state, t);
-    seen.gradient = numbers(seen.state, now);
+    seen.gradient = numbers(system, seen.state, now);
     for (std::size_t i = 0; i < n; ++i) {
       put(seen.slope, i, charts[i].rate(now.rates[i]));
       if constexpr (has_push) {
@@ -654,15 +654,22 @@ class Gauss {
   }
 
   /// B and what pushes μ, body frame.
-  [[nodiscard]] static constexpr Vector numbers(const StateOf<System>& state,
+  [[nodiscard]] static constexpr Vector numbers([[maybe_unused]] const System& system,
+                                                [[maybe_unused]] const StateOf<System>& state,
                                                 const Gradients& slope) noexcept {
     Vector x{};
+    [[maybe_unused]] Momenta coupling{};
+    if constexpr (has_coupling) {
+      RatesOf<System> shifts{};
+      for (std::size_t i = 0; i < n; ++i) shifts[i] = Chart::shift_of(slope.rates[i]);
+      coupling = free_momentum_rates(system, state.momenta, shifts);
+    }
     for (std::size_t i = 0; i < n; ++i) {
       put(x, i, slope.rates[i]);
       if constexpr (has_push) {
         Momentum push{};
         if constexpr (System::has_forque) push = push - slope.forques[i];
-        if constexpr (has_coupling) push = push + Chart::coupling(slope.rates[i], state.momenta[i]);
+        if constexpr (has_coupling) push = push + coupling[i];
         put_push(x, i, push);
       }
     }

@@ -170,21 +170,32 @@ template <HamiltonianSystem System>
   }
 }
 
-/// A system of bodies in principal frames, where P × V vanishes: it finds [μ, B] without.
+/// The rates of all bodies of a system.
 template <class System>
-concept PrincipalSystem =
-    requires(const System& system, const decltype(StateOf<System>::momenta)& momenta) {
-      system.free_momentum_rates(momenta);
-    };
+using RatesOf =
+    std::array<typename System::Group::template Rate<typename System::Scalar>, System::bodies>;
+
+/// A system that finds [μ, B] of its own B itself, without what vanishes in it, as P × V of
+/// V = P/m: products that in orbit exceed any torque by all digits.
+template <class System>
+concept InertialSystem =
+    requires(const System& system, const decltype(StateOf<System>::momenta)& momenta,
+             const RatesOf<System>& rates) { system.free_momentum_rates(momenta, rates); };
+
+/// Whether a system says that P × V of all its bodies vanishes.
+template <class System>
+inline constexpr bool moves_along_momentum = false;
+template <class System>
+  requires requires { System::moves_along_momentum; }
+inline constexpr bool moves_along_momentum<System> = System::moves_along_momentum;
 
 /// [μ, B] for every body at these rates.
 template <HamiltonianSystem System>
-[[nodiscard]] constexpr auto free_momentum_rates(
-    const System& system, const decltype(StateOf<System>::momenta)& momenta,
-    const std::array<typename System::Group::template Rate<typename System::Scalar>,
-                     System::bodies>& rates) noexcept {
-  if constexpr (PrincipalSystem<System>) {
-    return system.free_momentum_rates(momenta);
+[[nodiscard]] constexpr auto free_momentum_rates(const System& system,
+                                                 const decltype(StateOf<System>::momenta)& momenta,
+                                                 const RatesOf<System>& rates) noexcept {
+  if constexpr (InertialSystem<System>) {
+    return system.free_momentum_rates(momenta, rates);
   } else {
     auto result = momenta;
     for (std::size_t i = 0; i < System::bodies; ++i) result[i] = coadjoint(rates[i], momenta[i]);

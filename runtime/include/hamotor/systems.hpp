@@ -295,11 +295,11 @@ class FreeBody : public PrincipalBody<G, S, split> {
     return Rate::from(detail::joined(rotation_.rate(angular(mu)), velocity(mu, inverse_mass_)));
   }
 
-  /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out: in orbit it
-  /// is the difference of products that are larger than any torque by all digits.
-  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
+  /// [μ, B] for B = ∂T/∂μ: (Π×Ω, P×Ω).  P × V is zero, as V = P/m, and is left out.
+  [[nodiscard]] static constexpr Momentum free_momentum_rate(const Momentum& mu,
+                                                             const Rate& rate) noexcept {
     const auto pi = angular(mu);
-    const auto turning = rotation_.rate(pi);
+    const auto turning = detail::first<rotations>(rate.components());
     const auto p = detail::rest<rotations>(mu.components());
     if constexpr (rotations == 3) {
       return Momentum::from(detail::joined(detail::cross(pi, turning), detail::cross(p, turning)));
@@ -433,8 +433,9 @@ class PivotedBody : public PrincipalBody<G, S, split> {
   }
 
   /// [μ, B] for B = ∂T/∂μ: Π×Ω.
-  [[nodiscard]] constexpr Momentum free_momentum_rate(const Momentum& mu) const noexcept {
-    return coadjoint(rate(mu), mu);
+  [[nodiscard]] static constexpr Momentum free_momentum_rate(const Momentum& mu,
+                                                             const Rate& rate) noexcept {
+    return coadjoint(rate, mu);
   }
 
   /// What momenta are to be multiplied by for `unit` B.
@@ -730,6 +731,7 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   using Scalar = typename FirstBody::Scalar;
   static constexpr std::size_t bodies = sizeof...(Body);
   static constexpr bool has_forque = sizeof...(Interaction) > 0;
+  static constexpr bool moves_along_momentum = true;
   static constexpr bool free_motion_is_exact = (Body::free_motion_is_exact && ...);
   static constexpr bool nearly_symmetric =
       ((Body::free_motion_is_exact || Body::nearly_symmetric) && ...);
@@ -800,11 +802,10 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
     return result;
   }
 
-  /// [μ, B] for every body, body frame.
-  [[nodiscard]] constexpr Momenta free_momentum_rates(const Momenta& momenta) const noexcept {
-    Momenta result{};
-    for_each_body([&](auto i, const auto& one) { result[i] = one.free_momentum_rate(momenta[i]); });
-    return result;
+  /// [μ, B] for every body at its own rates, body frame.
+  [[nodiscard]] static constexpr Momenta free_momentum_rates(const Momenta& momenta,
+                                                             const Rates& rates) noexcept {
+    return free_momentum_rates(momenta, rates, std::index_sequence_for<Body...>{});
   }
 
   /// F_b = M~ F_s M = +dH for every body, body frame: μ̇ = [μ, B] − F_b.
@@ -893,6 +894,13 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
 
  private:
   friend RateForm<RigidBodies>;
+
+  template <std::size_t... i>
+  [[nodiscard]] static constexpr Momenta free_momentum_rates(const Momenta& momenta,
+                                                             const Rates& rates,
+                                                             std::index_sequence<i...>) noexcept {
+    return {Body::free_momentum_rate(momenta[i], rates[i])...};
+  }
 
   /// A function, as g++ sometimes leaves a lambda as a call, for which a state goes through memory.
   template <bool is_outer, bool is_small, std::size_t... i>
