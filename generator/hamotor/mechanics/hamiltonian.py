@@ -160,9 +160,7 @@ def coadjoint(body: Coordinates, rate: Sequence[Expr]) -> tuple[Expr, ...]:
     return _bracketed(body, rate, [None] * len(body.momenta))
 
 
-def inertial(
-    body: Coordinates, symbols: Sequence[Expr], rates: Sequence[Expr]
-) -> tuple[Expr, ...]:
+def inertial(body: Coordinates, symbols: Sequence[Expr], rates: Sequence[Expr]) -> tuple[Expr, ...]:
     """ad*_B μ of the rates, in symbols for them, less what cancels among those that are one
     multiple of their momenta: P × V of V = P/m, whose products exceed the torques of a body in
     orbit by all digits."""
