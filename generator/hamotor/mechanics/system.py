@@ -114,7 +114,8 @@ class System:
         """ad*_B μ of every body without what cancels in it, in its rates `rate{k}.NAME` and its
         momenta: outputs `inertial{k}.NAME`.  None where nothing does."""
         h = self.hamiltonian
-        outputs, names, cancels = {}, dict(self.names), False
+        outputs: dict[str, Expr] = {}
+        names, cancels = dict(self.names), False
         for k, (body, rates) in enumerate(zip(h.bodies, h.rates, strict=True)):
             generators = body.group.generators
             symbols = tuple(sympy.Symbol(f"_rate{k}_{g.rate}", real=True) for g in generators)
