@@ -220,7 +220,8 @@ def _add_run(parser: _Parser) -> None:
         "--tolerance",
         metavar="E",
         type=_positive,
-        help="an error of the final state of at most E, verified by a second, finer run",
+        help="an error of the final state of at most E, verified by a second, finer run; by the"
+        " cheapest method unless --method names one",
     )
     parser.add_argument(
         "--local-tolerance",

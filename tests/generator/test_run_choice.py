@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -102,10 +103,34 @@ def test_smaller_tolerances_take_more_time() -> None:
 
 
 def test_a_tolerance_is_met_by_the_method_that_was_chosen() -> None:
-    run = hamotor.load("tumble").run(method="auto", end=50.0, tolerance=1e-10)
+    run = hamotor.load("tumble").run(end=50.0, tolerance=1e-10)
     assert run.report["method"] == "closed_form"
     assert run.report["tolerance"]["achieved"] <= 1e-10
     assert "because it reached 1e-10" in run.summary()
+    assert "(the scene's own: --method splitting2)" in run.summary()
+
+
+def test_a_method_for_steps_gives_way_to_a_tolerance(monkeypatch: pytest.MonkeyPatch) -> None:
+    compiled: list[str] = []
+
+    class Compiled(Exception):
+        pass
+
+    def compile_(_: hamotor.Simulation, *, method: str, **__: object) -> None:
+        compiled.append(method)
+        raise Compiled
+
+    monkeypatch.setattr(hamotor.Simulation, "compile", compile_)
+    scene = hamotor.load("gravity_gradient")
+    for simulation, asked in (
+        (scene, {"tolerance": 1e-6}),
+        (scene, {"tolerance": 1e-6, "method": "rkmk4"}),
+        (scene, {"step": 1.0}),
+        (replace(scene, step=None, tolerance=1e-3), {"tolerance": 1e-6}),
+    ):
+        with pytest.raises(Compiled):
+            simulation.run(**asked)  # type: ignore[arg-type]
+    assert compiled == ["rk87", "rkmk4", "rkmk4", "rkmk4"]
 
 
 def test_an_account_is_reduced_to_what_is_cheapest() -> None:

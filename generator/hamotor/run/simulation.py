@@ -202,9 +202,11 @@ class Simulation:
         `tolerance` instead asks for an error of the final state, verified by a second run: half the
         step, or with a method that chooses its steps a sixteenth of the local tolerance, changes it
         by no more.  That is the largest change of a motor's component, and of a momentum's relative
-        to its initial norm.  `local_tolerance` (1/s) is, for methods that choose their steps, the
-        error they allow themselves per second; nothing is verified, and `step` is how often they
-        deliver the state (a thousandth of `end` if not given).
+        to its initial norm.  The scene's method, if its accuracy is a step, was chosen for that: it
+        gives way to `auto`, the cheapest, unless `method` names it.  `local_tolerance` (1/s) is,
+        for methods that choose their steps, the error they allow themselves per second; nothing is
+        verified, and `step` is how often they deliver the state (a thousandth of `end` if not
+        given).
 
         `compensated` sums over steps keep the digits that each addition would lose, so that
         rounding errors are of what changes; if neither this nor the scene says, where that costs
@@ -246,6 +248,9 @@ class Simulation:
             raise UsageError("give one of every, times and interval: when to record.")
         if csv and out is None:
             raise UsageError("csv needs out: the folder to write trajectory.csv into.")
+        at_least_cost = bool(
+            method is None and tolerance is not None and self.tolerance is None and self.structure
+        )
         end = self.end if end is None else end
         if local_tolerance is not None:
             step = abs(end) / ROWS if step is None else step
@@ -260,7 +265,7 @@ class Simulation:
         if interval is not None:
             times, every = at_interval(interval, end, step)
         methods = self.offered(kernels, representation)
-        chosen = method or self.method
+        chosen = "auto" if at_least_cost else method or self.method
         if method is None and chosen not in methods and chosen in self.methods:
             chosen = "auto"  # what the scene asks for is of its specialised form only
         reason = ""
@@ -283,6 +288,8 @@ class Simulation:
         method = chosen
         if not methods:
             method, reason = choose_method(chosen, description.methods, tolerance, self.structure)
+        if at_least_cost and self.method not in {"auto", method}:
+            reason += f" (the scene's own: --method {self.method})"
         if local_tolerance is not None and method not in description.error_controlled:
             raise UsageError(
                 f"{method} does not choose its steps, so it has no local tolerance; "
