@@ -129,7 +129,7 @@ def test_a_method_for_steps_gives_way_to_a_tolerance(monkeypatch: pytest.MonkeyP
         (replace(scene, step=None, tolerance=1e-3), {"tolerance": 1e-6}),
     ):
         with pytest.raises(Compiled):
-            simulation.run(**asked)  # type: ignore[arg-type]
+            simulation.run(**asked)
     assert compiled == ["rk87", "rkmk4", "rkmk4", "rkmk4"]
 
 
