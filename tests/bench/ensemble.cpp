@@ -120,12 +120,23 @@ Cost cost() {
     to = S(static_cast<double>(read));
   });
   Method<System> method;
+  [[maybe_unused]] const auto plan = [&] {
+    if constexpr (hamotor::carries_state<Method<System>>) {
+      typename Method<System>::Plan made(system, S::fixed(step));
+      method.open(made, state);
+      return made;
+    } else {
+      return 0;
+    }
+  }();
   const auto take = [&](int many) {
     for (int k = 0; k < many; ++k) {
       if constexpr (hamotor::stays_open<Method<System>>) {
         for (std::size_t turn = 0; turn < Method<System>::turns; ++turn) {
           method.template do_turn<true>(system, state, S::fixed(step), turn);
         }
+      } else if constexpr (hamotor::carries_state<Method<System>>) {
+        method.do_open_step(plan);
       } else {
         method.do_step(system, state, S::fixed(0), S::fixed(step));
       }

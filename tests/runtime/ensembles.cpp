@@ -110,15 +110,15 @@ TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
   EXPECT_EQ(hash_in<Rkmk4>(sample::forced_se2<Pack<double, 8>>(), plates, 2, 2), plate);
 }
 
-template <template <class> class Method, class Packs>
-void expect_bits_of_a_run(const Packs& packs) {
-  const auto system = sample::forced_so3();
+template <template <class> class Method, class System, class Packs>
+void expect_bits_of_a_run(const System& system, const Packs& packs) {
   const auto members = members_of(system, 5);
   Ensemble ensemble(packs, Method<Packs>{}, 0.5, step, std::span(members));
-  EXPECT_EQ(ensemble.advance(steps), 5U);
+  EXPECT_EQ(ensemble.advance(1), 5U);
+  EXPECT_EQ(ensemble.advance(steps - 1), 5U);
   for (std::size_t k = 0; k < 5; ++k) {
     auto state = members[k];
-    Method<std::remove_cvref_t<decltype(system)>> method;
+    Method<System> method;
     for (int n = 0; n < steps; ++n) method.do_step(system, state, 0.0, step);
     EXPECT_EQ(ensemble.state(k), state);
   }
@@ -126,8 +126,9 @@ void expect_bits_of_a_run(const Packs& packs) {
 }
 
 TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
-  expect_bits_of_a_run<Rk4>(sample::forced_so3<Pack<double, 8>>());
-  expect_bits_of_a_run<Splitting2>(sample::forced_so3<Pack<double, 4>>());
+  expect_bits_of_a_run<Rk4>(sample::forced_so3(), sample::forced_so3<Pack<double, 8>>());
+  expect_bits_of_a_run<Rk4>(sample::forced_se3(), sample::forced_se3<Pack<double, 8>>());
+  expect_bits_of_a_run<Splitting2>(sample::forced_so3(), sample::forced_so3<Pack<double, 4>>());
 }
 
 template <class System>

@@ -100,6 +100,13 @@ template <class Method>
   requires requires { Method::stays_open; }
 inline constexpr bool stays_open<Method> = Method::stays_open;
 
+/// Whether a method carries something else than the state, which is made of it when asked for.
+template <class Method>
+inline constexpr bool carries_state = false;
+template <class Method>
+  requires requires { Method::carries_state; }
+inline constexpr bool carries_state<Method> = Method::carries_state;
+
 /// Members of a system under way.
 ///
 /// `Systems` gives the system of a block, in which each lane may have parameters of its own.  With
@@ -288,9 +295,15 @@ class Ensemble {
       } else if constexpr (requires { typename Method::Plan; }) {
         const std::array<typename Method::Plan, in_turn> plans{
             typename Method::Plan(systems[g], h)...};
-        for (std::int64_t k = 0; k < steps; ++k) {
-          const Scalar t = now(index + k);
-          (blocks[g].method.do_step(plans[g], blocks[g].state, t), ...);
+        if constexpr (carries_state<Method>) {
+          (blocks[g].method.open(plans[g], blocks[g].state), ...);
+          for (std::int64_t k = 0; k < steps; ++k) (blocks[g].method.do_open_step(plans[g]), ...);
+          ((blocks[g].state = blocks[g].method.closed(plans[g])), ...);
+        } else {
+          for (std::int64_t k = 0; k < steps; ++k) {
+            const Scalar t = now(index + k);
+            (blocks[g].method.do_step(plans[g], blocks[g].state, t), ...);
+          }
         }
       } else {
         for (std::int64_t k = 0; k < steps; ++k) {

@@ -90,31 +90,6 @@ template <class S, std::size_t R, std::size_t D, std::size_t points>
 
 namespace detail {
 
-/// The angular part of a momentum's or rate's components.
-template <std::size_t R, class S, std::size_t D>
-[[nodiscard]] constexpr std::array<S, R> first(const std::array<S, D>& x) noexcept {
-  std::array<S, R> result{};
-  for (std::size_t k = 0; k < R; ++k) result[k] = x[k];
-  return result;
-}
-
-/// What follows the first R components.
-template <std::size_t R, class S, std::size_t D>
-[[nodiscard]] constexpr std::array<S, D - R> rest(const std::array<S, D>& x) noexcept {
-  std::array<S, D - R> result{};
-  for (std::size_t k = R; k < D; ++k) result[k - R] = x[k];
-  return result;
-}
-
-template <class S, std::size_t A, std::size_t B>
-[[nodiscard]] constexpr std::array<S, A + B> joined(const std::array<S, A>& a,
-                                                    const std::array<S, B>& b) noexcept {
-  std::array<S, A + B> result{};
-  for (std::size_t k = 0; k < A; ++k) result[k] = a[k];
-  for (std::size_t k = 0; k < B; ++k) result[A + k] = b[k];
-  return result;
-}
-
 template <class S, std::size_t D>
 [[nodiscard]] constexpr S dot(const std::array<S, D>& a, const std::array<S, D>& b) noexcept {
   S sum = a[0] * b[0];

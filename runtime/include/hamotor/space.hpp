@@ -117,6 +117,99 @@ template <class T, class A, class B>
   return T::from(z);
 }
 
+/// A factor of 1 that costs nothing.
+struct One {
+  template <class T>
+  [[nodiscard]] HAMOTOR_INLINE friend constexpr T operator*(const One&, const T& x) noexcept {
+    return x;
+  }
+  template <class T>
+  [[nodiscard]] HAMOTOR_INLINE friend constexpr T mul_add(const One&, const T& x,
+                                                          const T& y) noexcept {
+    return x + y;
+  }
+};
+
+/// Each component by a factor.
+template <class Factor, class S, std::size_t D>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> scaled(const Factor& factor,
+                                                               std::array<S, D> x) noexcept {
+  for (auto& component : x) component = factor * component;
+  return x;
+}
+/// x + factor y.
+template <class Factor, class S, std::size_t D>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> sum_with(
+    std::array<S, D> x, const Factor& factor, const std::array<S, D>& y) noexcept {
+  for (std::size_t k = 0; k < D; ++k) x[k] = mul_add(factor, y[k], x[k]);
+  return x;
+}
+
+/// The angular part of a momentum's or rate's components.
+template <std::size_t R, class S, std::size_t D>
+[[nodiscard]] constexpr std::array<S, R> first(const std::array<S, D>& x) noexcept {
+  std::array<S, R> result{};
+  for (std::size_t k = 0; k < R; ++k) result[k] = x[k];
+  return result;
+}
+
+/// What follows the first R components.
+template <std::size_t R, class S, std::size_t D>
+[[nodiscard]] constexpr std::array<S, D - R> rest(const std::array<S, D>& x) noexcept {
+  std::array<S, D - R> result{};
+  for (std::size_t k = R; k < D; ++k) result[k - R] = x[k];
+  return result;
+}
+
+template <class S, std::size_t A, std::size_t B>
+[[nodiscard]] constexpr std::array<S, A + B> joined(const std::array<S, A>& a,
+                                                    const std::array<S, B>& b) noexcept {
+  std::array<S, A + B> result{};
+  for (std::size_t k = 0; k < A; ++k) result[k] = a[k];
+  for (std::size_t k = 0; k < B; ++k) result[A + k] = b[k];
+  return result;
+}
+
+/// Half a rotation's matrix, by rows: rotors make it without a factor 2, and what is turned by it
+/// can have that.
+template <class S, std::size_t D>
+struct HalfTurn {
+  std::array<std::array<S, D>, D> rows;
+
+  /// start + ½ R x.
+  [[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> turned(
+      std::array<S, D> start, const std::array<S, D>& x) const noexcept {
+    for (std::size_t i = 0; i < D; ++i) {
+      for (std::size_t k = 0; k < D; ++k) start[i] = mul_add(rows[i][k], x[k], start[i]);
+    }
+    return start;
+  }
+  /// ½ Rᵀ x.
+  [[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> turned_back(
+      const std::array<S, D>& x) const noexcept {
+    std::array<S, D> y{};
+    for (std::size_t i = 0; i < D; ++i) {
+      y[i] = rows[0][i] * x[0];
+      for (std::size_t k = 1; k < D; ++k) y[i] = mul_add(rows[k][i], x[k], y[i]);
+    }
+    return y;
+  }
+};
+
+/// `start` and the moment x × f.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 3> with_moment(
+    const std::array<S, 3>& start, const std::array<S, 3>& x, const std::array<S, 3>& f) noexcept {
+  return {less(onto(start[0], x[1], f[2]), x[2], f[1]),
+          less(onto(start[1], x[2], f[0]), x[0], f[2]),
+          less(onto(start[2], x[0], f[1]), x[1], f[0])};
+}
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, 1> with_moment(
+    const std::array<S, 1>& start, const std::array<S, 2>& x, const std::array<S, 2>& f) noexcept {
+  return {less(onto(start[0], x[0], f[1]), x[1], f[0])};
+}
+
 }  // namespace detail
 
 /// Geometry of the space on which G acts; specialised for each group.
@@ -179,6 +272,55 @@ struct Space<pga3::SE3> {
     return {less(onto(half * x.e032, m.e02, m.e12), m.e01, m.s, m.e03, m.e31, m.e0123, m.e23),
             less(onto(half * x.e013, m.e03, m.e23), m.e02, m.s, m.e01, m.e12, m.e0123, m.e31),
             less(onto(half * x.e021, m.e01, m.e31), m.e03, m.s, m.e02, m.e23, m.e0123, m.e12)};
+  }
+
+  /// How a body is turned: s, e23, e31, e12 of its motor.
+  template <class S>
+  using Attitude = std::array<S, 4>;
+  template <class S>
+  [[nodiscard]] static constexpr Attitude<S> attitude(const pga3::Motor<S>& m) noexcept {
+    return {m.s, m.e23, m.e31, m.e12};
+  }
+  /// The motor of a body that is turned so, with its frame's origin at x.
+  template <class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Motor<S> motor(
+      const Attitude<S>& a, const std::array<S, 3>& x) noexcept {
+    using detail::less;
+    const std::array<S, 3> h{S(0.5) * x[0], S(0.5) * x[1], S(0.5) * x[2]};
+    return {a[0],
+            a[1],
+            a[2],
+            a[3],
+            less(h[1] * a[3], h[2], a[2], h[0], a[0]),
+            less(h[2] * a[1], h[0], a[3], h[1], a[0]),
+            less(h[0] * a[2], h[1], a[1], h[2], a[0]),
+            less(detail::Nothing::Zero{}, h[0], a[1], h[1], a[2], h[2], a[3])};
+  }
+  template <class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr detail::HalfTurn<S, 3> half_turn(
+      const Attitude<S>& a) noexcept {
+    const S first = less_product(a[3], a[3], S(0.5));
+    const S third = less_product(a[1], a[1], S(0.5));
+    const S xy = a[1] * a[2];
+    const S yz = a[2] * a[3];
+    const S zx = a[3] * a[1];
+    return {
+        {{{less_product(a[2], a[2], first), mul_add(a[0], a[3], xy), less_product(a[0], a[2], zx)},
+          {less_product(a[0], a[3], xy), less_product(a[1], a[1], first), mul_add(a[0], a[1], yz)},
+          {mul_add(a[0], a[2], zx), less_product(a[0], a[1], yz),
+           less_product(a[2], a[2], third)}}}};
+  }
+
+  /// `start` and 2 a B of a rate B that turns.
+  template <class Start, class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Attitude<S> with_twice_turning(
+      const Start& start, const Attitude<S>& a, const std::array<S, 3>& w) noexcept {
+    using detail::less;
+    using detail::onto;
+    return {onto(start[0], a[1], w[0], a[2], w[1], a[3], w[2]),
+            less(onto(start[1], a[2], w[2]), a[0], w[0], a[3], w[1]),
+            less(onto(start[2], a[3], w[0]), a[0], w[1], a[1], w[2]),
+            less(onto(start[3], a[1], w[1]), a[0], w[2], a[2], w[0])};
   }
 
   /// `start` and 2 M B of a rate B.
@@ -382,6 +524,37 @@ struct Space<pga2::SE2> {
                                                               const pga2::Motor<S>& m) noexcept {
     const auto y = sandwich(reverse(m), pga2::Origin<S>{});
     return {x.e20 - y.e20, x.e01 - y.e01};
+  }
+
+  /// How a body is turned: s, e12 of its motor.
+  template <class S>
+  using Attitude = std::array<S, 2>;
+  template <class S>
+  [[nodiscard]] static constexpr Attitude<S> attitude(const pga2::Motor<S>& m) noexcept {
+    return {m.s, m.e12};
+  }
+  /// The motor of a body that is turned so, with its frame's origin at x.
+  template <class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::Motor<S> motor(
+      const Attitude<S>& a, const std::array<S, 2>& x) noexcept {
+    using detail::less;
+    const std::array<S, 2> h{S(0.5) * x[0], S(0.5) * x[1]};
+    return {a[0], a[1], less(h[1] * a[1], h[0], a[0]),
+            less(detail::Nothing::Zero{}, h[0], a[1], h[1], a[0])};
+  }
+  template <class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr detail::HalfTurn<S, 2> half_turn(
+      const Attitude<S>& a) noexcept {
+    const S cosine = less_product(a[1], a[1], S(0.5));
+    const S sine = a[0] * a[1];
+    return {{{{cosine, sine}, {-sine, cosine}}}};
+  }
+
+  /// `start` and 2 a B of a rate B that turns.
+  template <class Start, class S>
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Attitude<S> with_twice_turning(
+      const Start& start, const Attitude<S>& a, const std::array<S, 1>& w) noexcept {
+    return {detail::onto(start[0], a[1], w[0]), detail::less(start[1], a[0], w[0])};
   }
 
   /// `start` and 2 M B of a rate B.

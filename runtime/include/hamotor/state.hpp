@@ -145,6 +145,14 @@ concept RateSystem =
       { system.in_rates(unit).momentum_weights(unit) } -> std::same_as<typename System::Momenta>;
     };
 
+/// A rate system whose bodies can also be stepped in the world: attitude and rate in place of motor
+/// and momentum, position and velocity in the world's frame, where they are linear.
+template <class System>
+concept WorldSystem =
+    RateSystem<System> && requires(const System& system, const typename System::Scalar& unit) {
+      system.in_world(unit).momentum_weights(unit);
+    };
+
 /// The state space of a system.
 template <class System>
 using StateOf = State<typename System::Group, System::bodies, typename System::Scalar>;

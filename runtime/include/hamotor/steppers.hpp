@@ -29,6 +29,13 @@ template <class Rate, class S>
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
 }
 
+/// Whether a state is compared with the one that a step ended with.  Packs are not: an ensemble
+/// changes no state between steps.
+template <class S>
+inline constexpr bool is_compared = requires {
+  { S(0) == S(0) } -> std::same_as<bool>;
+};
+
 /// Whether spins commute with everything else in a system and are left to the end of a step.
 template <class System>
 inline constexpr bool has_spin_apart = false;
@@ -202,6 +209,9 @@ class ExplicitMethod {
           return Space<G>::put_back(motor, by);
         });
   }
+
+  /// How far a step left the group.
+  constexpr void note(const std::array<S, n>& defects) noexcept { record(account_.drift, defects); }
 
   /// Six times the mean of a step of the classical method.
   template <class T>
@@ -518,10 +528,195 @@ class RateStages {
   typename System::Momenta sixth_;
 };
 
+/// The same of bodies that translate, with their positions and velocities in the world: these are
+/// linear in each other, so that three evaluations of the force are all their stages need
+/// (Nyström 1925), and where nothing acts they are exact however fast bodies turn.
+///
+/// What is carried from step to step has no units of h.
+template <WorldSystem System>
+class WorldStages {
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Space = hamotor::Space<G>;
+  using Form = decltype(std::declval<const System&>().in_world(S()));
+  using Attitudes = typename Form::Attitudes;
+  using Vectors = typename Form::Vectors;
+  using Turnings = typename Form::Turnings;
+  static constexpr std::size_t n = System::bodies;
+  static constexpr std::size_t rotations = Space::rotations;
+  static constexpr std::size_t dimension = Space::dimension;
+
+ public:
+  /// Bodies in the world.
+  struct Carried {
+    Attitudes attitudes;
+    Turnings angular;    ///< Π, body frame
+    Vectors positions;   ///< m
+    Vectors velocities;  ///< m/s
+  };
+
+  constexpr WorldStages(const System& system, const S& h) noexcept
+      : form_(system.in_world(S(0.25) * h)) {
+    const S whole = S(0.375) * h;
+    const S per_whole = select(whole == S(0), S(0), S(1) / whole);
+    sixth_ = form_.momentum_weights(per_whole);
+    for (std::size_t k = 0; k < by_forces_.size(); ++k) {
+      by_forces_[k] = std::array{S(4), S(8), S(8) / S(3), per_whole}[k] * form_.force_unit();
+    }
+    time_ = h;
+    half_time_ = S(0.5) * h;
+    half_step_ = form_.rate_weights();
+    whole_step_ = form_.rate_weights();
+    for (std::size_t i = 0; i < n; ++i) {
+      half_step_[i] = scaled(S(2), half_step_[i]);
+      whole_step_[i] = scaled(S(4), whole_step_[i]);
+    }
+    system.for_each_body([&](auto i, const auto& body) {
+      twice_mass_[i] = S(2) * body.mass();
+      per_half_mass_[i] = S(2) / body.mass();
+    });
+  }
+
+  [[nodiscard]] constexpr Carried carried(const StateOf<System>& state) const noexcept {
+    Carried result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto& motor = state.motors[i];
+      const auto momentum = state.momenta[i].components();
+      const auto velocity = scaled(per_half_mass_[i], rest<rotations>(momentum));
+      result.attitudes[i] = Space::attitude(motor);
+      result.angular[i] = first<rotations>(momentum);
+      result.positions[i] = sandwich(motor, typename Space::template Origin<S>{}).components();
+      result.velocities[i] = Space::half_turn(result.attitudes[i]).turned({}, velocity);
+    }
+    return result;
+  }
+
+  [[nodiscard]] constexpr StateOf<System> state(const Carried& carried) const noexcept {
+    using State = StateOf<System>;
+    State result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto& attitude = carried.attitudes[i];
+      const auto momentum = scaled(twice_mass_[i], carried.velocities[i]);
+      result.motors[i] = Space::motor(attitude, carried.positions[i]);
+      result.momenta[i] = State::Momentum::from(
+          joined(carried.angular[i], Space::half_turn(attitude).turned_back(momentum)));
+    }
+    return result;
+  }
+
+  /// A step, and how far each body's left the group.
+  [[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, n> step(Carried& at) const noexcept {
+    note_evaluations<S>(4);
+    const Turnings start = form_.rates(at.angular);
+    const auto one = form_.slopes(nothing, Nothing{}, at.attitudes, at.positions, start);
+    const Attitudes second = turned(at.attitudes, at.attitudes, start);
+    const Turnings second_rates = turning(half_step_, one, start);
+    Vectors positions = moved(half_time_, at.velocities, at.positions);
+    const Vectors end = moved(time_, at.velocities, at.positions);
+
+    const auto two = form_.slopes(nothing, Nothing{}, second, positions, second_rates);
+    const Attitudes third = turned(at.attitudes, second, second_rates);
+    const Turnings third_rates = turning(half_step_, two, start);
+    if constexpr (System::has_forque) positions = moved(by_forces_[0], forces(one), positions);
+
+    const auto three = form_.slopes(nothing, Nothing{}, third, positions, third_rates);
+    Turnings twice_rates = third_rates;
+    for (auto& rate : twice_rates) rate = scaled(S(2), rate);
+    const Attitudes fourth = turned(at.attitudes, third, twice_rates);
+    const Turnings fourth_rates = turning(whole_step_, three, start);
+    if constexpr (System::has_forque) positions = moved(by_forces_[1], forces(two), end);
+
+    Turnings moments{};
+    Vectors pushed{};
+    Vectors twice_pushed{};
+    for (std::size_t i = 0; i < n; ++i) {
+      moments[i] = sum_with(one[i].moment, S(2), sum_with(two[i].moment, One{}, three[i].moment));
+      if constexpr (System::has_forque) {
+        const auto later = sum_with(two[i].force, One{}, three[i].force);
+        pushed[i] = sum_with(one[i].force, One{}, later);
+        twice_pushed[i] = sum_with(pushed[i], One{}, later);
+      }
+    }
+    const auto sum = form_.slopes([&](std::size_t i) { return moments[i]; }, twice_pushed, fourth,
+                                  positions, fourth_rates);
+
+    std::array<S, n> defects{};
+    for (std::size_t i = 0; i < n; ++i) {
+      Attitude place = at.attitudes[i];
+      for (std::size_t k = 0; k < place.size(); ++k) place[k] = second[i][k] - place[k];
+      place = Space::with_twice_turning(place, fourth[i], fourth_rates[i]);
+      for (std::size_t k = 0; k < place.size(); ++k) {
+        place[k] = place[k] + mul_add(S(2), third[i][k], fourth[i][k]);
+      }
+      // A third of this, put back on the group.
+      S square = place[0] * place[0];
+      for (std::size_t k = 1; k < place.size(); ++k) square = mul_add(place[k], place[k], square);
+      at.attitudes[i] = scaled(mul_add(S(-0.5) / S(27), square, S(0.5)), place);
+      defects[i] = scalar::abs(mul_add(S(1) / S(9), square, S(-1)));
+      for (std::size_t k = 0; k < rotations; ++k) {
+        at.angular[i][k] = mul_add(sixth_[i][k], sum[i].moment[k], at.angular[i][k]);
+      }
+    }
+    at.positions = end;
+    if constexpr (System::has_forque) {
+      at.positions = moved(by_forces_[2], pushed, end);
+      at.velocities = moved(by_forces_[3], forces(sum), at.velocities);
+    }
+    return defects;
+  }
+
+ private:
+  using Attitude = typename Space::template Attitude<S>;
+  using Pushes = typename Form::Pushes;
+
+  static constexpr Nothing nothing(std::size_t /*body*/) noexcept { return {}; }
+
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Attitudes turned(const Attitudes& start,
+                                                                 const Attitudes& here,
+                                                                 const Turnings& rates) noexcept {
+    Attitudes there{};
+    for (std::size_t i = 0; i < n; ++i) {
+      there[i] = Space::with_twice_turning(start[i], here[i], rates[i]);
+    }
+    return there;
+  }
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Turnings turning(const Turnings& weights,
+                                                                 const Pushes& along,
+                                                                 Turnings rates) noexcept {
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < rotations; ++k) {
+        rates[i][k] = mul_add(weights[i][k], along[i].moment[k], rates[i][k]);
+      }
+    }
+    return rates;
+  }
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Vectors moved(const S& by, const Vectors& along,
+                                                              Vectors positions) noexcept {
+    for (std::size_t i = 0; i < n; ++i) positions[i] = sum_with(positions[i], by, along[i]);
+    return positions;
+  }
+  [[nodiscard]] HAMOTOR_INLINE static constexpr Vectors forces(const Pushes& pushes) noexcept {
+    Vectors result{};
+    for (std::size_t i = 0; i < n; ++i) result[i] = pushes[i].force;
+    return result;
+  }
+
+  Form form_;
+  Turnings half_step_;
+  Turnings whole_step_;
+  Turnings sixth_;
+  std::array<S, 4> by_forces_;  ///< of positions at three places, and of the velocity
+  S time_;
+  S half_time_;
+  std::array<S, n> twice_mass_;
+  std::array<S, n> per_half_mass_;
+};
+
 }  // namespace detail
 
 /// The classical Runge–Kutta method of order 4 on the components of M and μ, put back on the group
-/// after every step.
+/// after every step; of rigid bodies that translate on the components of attitude and angular
+/// momentum, and of position and velocity in the world.
 ///
 /// No exponentials: about half the time of `Rkmk4`, whose error is smaller where bodies turn fast.
 /// Four evaluations of rate and forque a step; not symplectic.
@@ -530,7 +725,9 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   using Base = detail::ExplicitMethod<System, summation>;
   using typename Base::S;
   static constexpr auto stages_of() noexcept {
-    if constexpr (RateSystem<System>) {
+    if constexpr (WorldSystem<System> && summation == Summation::plain) {
+      return std::type_identity<detail::WorldStages<System>>{};
+    } else if constexpr (RateSystem<System>) {
       return std::type_identity<detail::RateStages<System, summation>>{};
     } else {
       return std::type_identity<detail::MomentumStages<System>>{};
@@ -541,6 +738,10 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
  public:
   static constexpr int order = 4;
   static constexpr std::string_view name = "rk4";
+  /// Whether steps can be left open: what they carry in place of the state is made a state, by
+  /// `closed`, when that is asked for.  Of a run by itself every step is closed, and its bits are
+  /// the same.
+  static constexpr bool carries_state = requires { typename Stages::Carried; };
 
   /// What is the same in all steps of h; keeps a reference to the system.
   class Plan {
@@ -562,21 +763,78 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   /// The same by a plan for h.  Flat: a slope that is called returns through memory.
   [[gnu::flatten]] constexpr void do_step(const Plan& plan, StateOf<System>& state,
                                           const S& t) noexcept {
-    const Stages& stages = plan.stages_;
-    const auto start = stages.start(state);
-    typename Stages::Sum sum{};
-    const auto second = stages.template next<0>(t, start, start, sum);
-    const auto third = stages.template next<1>(t, start, second, sum);
-    const auto fourth = stages.template next<2>(t, start, third, sum);
-    stages.add_last(t, fourth, sum);
-    if constexpr (!RateSystem<System>) {
-      this->shift(state, plan.step_ / S(6), sum.motors, sum.momenta, sum.power);
-    } else if constexpr (Stages::sums_places) {
-      this->settle(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
+    if constexpr (carries_state) {
+      open(plan, state);
+      do_open_step(plan);
+      state = closed(plan);
     } else {
-      this->shift(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
+      const Stages& stages = plan.stages_;
+      const auto start = stages.start(state);
+      typename Stages::Sum sum{};
+      const auto second = stages.template next<0>(t, start, start, sum);
+      const auto third = stages.template next<1>(t, start, second, sum);
+      const auto fourth = stages.template next<2>(t, start, third, sum);
+      stages.add_last(t, fourth, sum);
+      if constexpr (!RateSystem<System>) {
+        this->shift(state, plan.step_ / S(6), sum.motors, sum.momenta, sum.power);
+      } else if constexpr (Stages::sums_places) {
+        this->settle(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
+      } else {
+        this->shift(state, S(1) / S(3), sum.motors, stages.sixth(), sum.momenta);
+      }
     }
   }
+
+  /// Takes up a state, if it is not the one that the last step ended with.
+  constexpr void open(const Plan& plan, const StateOf<System>& state) noexcept
+    requires(carries_state)
+  {
+    if (is_known(state)) return;
+    known_.carried = plan.stages_.carried(state);
+    known_.any = true;
+  }
+
+  /// A step from there.
+  [[gnu::flatten]] HAMOTOR_INLINE constexpr void do_open_step(const Plan& plan) noexcept
+    requires(carries_state)
+  {
+    this->note(plan.stages_.step(known_.carried));
+  }
+
+  /// The state after the steps so far.
+  [[nodiscard]] constexpr StateOf<System> closed(const Plan& plan) noexcept
+    requires(carries_state)
+  {
+    const StateOf<System> state = plan.stages_.state(known_.carried);
+    if constexpr (detail::is_compared<S>) known_.state = state;
+    return state;
+  }
+
+  /// The next step is from another state.
+  constexpr void forget() noexcept {
+    Base::forget();
+    if constexpr (carries_state) known_.any = false;
+  }
+
+ private:
+  struct Nothing {};
+  template <class Carrying>
+  struct Known {
+    typename Carrying::Carried carried{};
+    [[no_unique_address]] std::conditional_t<detail::is_compared<S>, StateOf<System>, Nothing>
+        state{};
+    bool any = false;
+  };
+
+  [[nodiscard]] constexpr bool is_known(const StateOf<System>& state) const noexcept {
+    if constexpr (detail::is_compared<S>) {
+      return known_.any && known_.state == state;
+    } else {
+      return known_.any;
+    }
+  }
+
+  [[no_unique_address]] std::conditional_t<carries_state, Known<Stages>, Nothing> known_{};
 };
 
 /// Symmetric, symplectic splitting of order 2, 4, 6, 8 or 10: kicks and free motions in turn, where
@@ -736,11 +994,8 @@ class Splitting {
   static constexpr bool opens_with_kick =
       System::has_forque && detail::rounded_weights<double, Scheme>().kicks[0] > 0;
 
-  /// Packs are not compared: an ensemble changes no state between steps.
   [[nodiscard]] constexpr bool is_known_at(const Motors& motors) const noexcept {
-    if constexpr (requires {
-                    { S(0) == S(0) } -> std::same_as<bool>;
-                  }) {
+    if constexpr (detail::is_compared<S>) {
       return known_.at == motors && known_.any;
     } else {
       return known_.any;

@@ -21,30 +21,10 @@ namespace hamotor {
 
 namespace detail {
 
-/// A factor of 1 that costs nothing.
-struct One {
-  template <class T>
-  [[nodiscard]] HAMOTOR_INLINE friend constexpr T operator*(const One&, const T& x) noexcept {
-    return x;
-  }
-  template <class T>
-  [[nodiscard]] HAMOTOR_INLINE friend constexpr T mul_add(const One&, const T& x,
-                                                          const T& y) noexcept {
-    return x + y;
-  }
-};
-
 struct Ones {
   [[nodiscard]] constexpr One operator[](std::size_t) const noexcept { return {}; }
 };
 
-/// Each component by a factor.
-template <class Factor, class S, std::size_t D>
-[[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> scaled(const Factor& factor,
-                                                               std::array<S, D> x) noexcept {
-  for (auto& component : x) component = factor * component;
-  return x;
-}
 template <std::size_t D, class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, D> filled(const S& x) noexcept {
   std::array<S, D> result{};
@@ -116,6 +96,66 @@ template <class System, class Interaction, class Weights>
     return interaction.weighted(system, weights);
   } else {
     return Weighted<Interaction, Weights>{interaction, weights};
+  }
+}
+
+/// Where a body is in the world.
+template <class G, class S>
+struct Pose {
+  typename Space<G>::template Attitude<S> attitude;
+  std::array<S, Space<G>::dimension> position;
+  HalfTurn<S, Space<G>::dimension> half_turn;  ///< of the attitude
+};
+
+/// What changes the momenta of a body: the moment in the body's frame, the force in the world's.
+template <class G, class S>
+struct Push {
+  std::array<S, Space<G>::rotations> moment;
+  std::array<S, Space<G>::dimension> force;
+};
+
+/// Adds a force, world frame, at a point of a body; `lever` is twice where.
+template <class G, class S>
+HAMOTOR_INLINE constexpr void push_at(const Pose<G, S>& pose, Push<G, S>& push,
+                                      const std::array<S, Space<G>::dimension>& lever,
+                                      const std::array<S, Space<G>::dimension>& force) noexcept {
+  push.force = sum_with(push.force, One{}, force);
+  push.moment = with_moment(push.moment, lever, pose.half_turn.turned_back(force));
+}
+
+/// An interaction that knows body forques only, as it pushes bodies.
+template <class System, class Interaction, class Weights>
+struct PushOfForque {
+  const System& system;
+  const Interaction& interaction;
+  Weights weights;
+
+  template <class G, class S, std::size_t n>
+  HAMOTOR_INLINE constexpr void add(const std::array<Pose<G, S>, n>& poses,
+                                    std::array<Push<G, S>, n>& pushes) const noexcept {
+    constexpr std::size_t turns = Space<G>::rotations;
+    typename System::Motors motors{};
+    for (std::size_t i = 0; i < n; ++i) {
+      motors[i] = Space<G>::motor(poses[i].attitude, poses[i].position);
+    }
+    typename System::Momenta forques{};
+    interaction.add_forque(system, motors, forques, weights);
+    for (std::size_t i = 0; i < n; ++i) {
+      const auto x = forques[i].components();
+      std::array<S, Space<G>::dimension> twice{};
+      for (std::size_t k = 0; k < twice.size(); ++k) twice[k] = x[turns + k] + x[turns + k];
+      for (std::size_t k = 0; k < turns; ++k) pushes[i].moment[k] = pushes[i].moment[k] + x[k];
+      pushes[i].force = poses[i].half_turn.turned(pushes[i].force, twice);
+    }
+  }
+};
+template <class System, class Interaction, class Weights>
+[[nodiscard]] constexpr auto push_of(const System& system, const Interaction& interaction,
+                                     const Weights& weights) noexcept {
+  if constexpr (requires { interaction.push(system, weights); }) {
+    return interaction.push(system, weights);
+  } else {
+    return PushOfForque<System, Interaction, Weights>{system, interaction, weights};
   }
 }
 
@@ -551,6 +591,30 @@ struct UniformGravity {
       forque[i] = body.with_weight_forque(forque[i], motors[i], acceleration, weights[i]);
     });
   }
+
+  /// What bodies that move freely are pushed by, for always the same weights.
+  template <class System, std::size_t n>
+  [[nodiscard]] constexpr auto push(const System& system,
+                                    const std::array<S, n>& weights) const noexcept {
+    Weight<n> result{};
+    system.for_each_body([&](auto i, const auto& body) {
+      result.forces[i] = detail::scaled(weights[i] * -body.mass(), acceleration.components());
+    });
+    return result;
+  }
+
+ private:
+  template <std::size_t n>
+  struct Weight {
+    std::array<std::array<S, Space<G>::dimension>, n> forces;
+
+    HAMOTOR_INLINE constexpr void add(const std::array<detail::Pose<G, S>, n>& /*poses*/,
+                                      std::array<detail::Push<G, S>, n>& pushes) const noexcept {
+      for (std::size_t i = 0; i < n; ++i) {
+        pushes[i].force = detail::sum_with(pushes[i].force, detail::One{}, forces[i]);
+      }
+    }
+  };
 };
 
 /// Whether a spring has a length at which it is slack.  Without one its potential is ½ k r², smooth
@@ -622,7 +686,66 @@ struct SpringToWorld {
     return Pull{*this, pull, Space<G>::scaled(pull, at)};
   }
 
+  /// How it pushes the body, for always the same weights.
+  template <class System, std::size_t n>
+  [[nodiscard]] constexpr auto push(const System& /*system*/,
+                                    const std::array<S, n>& weights) const noexcept {
+    if constexpr (rest == RestLength::zero) {
+      const S pull = weights[index] * stiffness;
+      return Push<S>{*this, pull, twice(pull), twice(pull)};
+    } else {
+      return Push<S>{*this, weights[index], twice(S(1)), twice(S(1))};
+    }
+  }
+
+  /// The same where nothing else acts, with forces in units of `force_unit`: there is none before.
+  template <std::size_t n>
+  [[nodiscard]] constexpr auto push_alone(const std::array<S, n>& weights) const noexcept
+    requires(rest == RestLength::zero)
+  {
+    return Push<detail::One>{*this, {}, twice(S(1)), twice(force_unit(weights))};
+  }
+  template <std::size_t n>
+  [[nodiscard]] constexpr S force_unit(const std::array<S, n>& weights) const noexcept {
+    return weights[index] * stiffness;
+  }
+
  private:
+  /// `at` by twice a factor.
+  [[nodiscard]] constexpr std::array<S, Space<G>::dimension> twice(const S& factor) const noexcept {
+    return detail::scaled(S(2) * factor, at.components());
+  }
+
+  template <class Factor>
+  struct Push {
+    const SpringToWorld& spring;
+    [[no_unique_address]] Factor factor;       ///< of the force over the extension or its part
+    std::array<S, Space<G>::dimension> lever;  ///< to where the force is
+    std::array<S, Space<G>::dimension> moment_lever;  ///< of the extension's moment or the force's
+
+    template <std::size_t n>
+    HAMOTOR_INLINE constexpr void add(const std::array<detail::Pose<G, S>, n>& poses,
+                                      std::array<detail::Push<G, S>, n>& pushes) const noexcept {
+      using Point = typename Space<G>::template Point<S>;
+      const auto& pose = poses[index];
+      const auto apart = detail::difference(Point::from(pose.position), spring.anchor);
+      if constexpr (rest == RestLength::zero) {
+        // Without R at, whose moment is none.
+        auto& [moment, force] = pushes[index];
+        if constexpr (std::is_same_v<Factor, detail::One>) {
+          force = pose.half_turn.turned(apart, lever);
+        } else {
+          force = pose.half_turn.turned(detail::sum_with(force, factor, apart), lever);
+        }
+        moment = detail::with_moment(moment, moment_lever, pose.half_turn.turned_back(apart));
+      } else {
+        const auto reach = pose.half_turn.turned(apart, lever);
+        const S pull = detail::tension<rest>(spring.stiffness, spring.rest_length, reach);
+        detail::push_at(pose, pushes[index], moment_lever, detail::scaled(factor * pull, reach));
+      }
+    }
+  };
+
   struct Pull {
     const SpringToWorld& spring;
     S pull;
@@ -676,7 +799,35 @@ struct SpringBetween {
     forque[two] = with_end(forque[two], weights[two] * pull, motors[two], at_two, f);
   }
 
+  /// How it pushes the two bodies, for always the same weights.
+  template <class System, std::size_t n>
+  [[nodiscard]] constexpr auto push(const System& /*system*/,
+                                    const std::array<S, n>& weights) const noexcept {
+    return Push{*this, -weights[one], weights[two], detail::scaled(S(2), at_one.components()),
+                detail::scaled(S(2), at_two.components())};
+  }
+
  private:
+  struct Push {
+    const SpringBetween& spring;
+    S weight_one;
+    S weight_two;
+    std::array<S, Space<G>::dimension> lever_one;  ///< twice `at_one`
+    std::array<S, Space<G>::dimension> lever_two;
+
+    template <std::size_t n>
+    HAMOTOR_INLINE constexpr void add(const std::array<detail::Pose<G, S>, n>& poses,
+                                      std::array<detail::Push<G, S>, n>& pushes) const noexcept {
+      using Point = typename Space<G>::template Point<S>;
+      const auto from = poses[one].half_turn.turned(poses[one].position, lever_one);
+      const auto to = poses[two].half_turn.turned(poses[two].position, lever_two);
+      const auto reach = detail::difference(Point::from(to), Point::from(from));
+      const S pull = detail::tension<rest>(spring.stiffness, spring.rest_length, reach);
+      detail::push_at(poses[one], pushes[one], lever_one, detail::scaled(weight_one * pull, reach));
+      detail::push_at(poses[two], pushes[two], lever_two, detail::scaled(weight_two * pull, reach));
+    }
+  };
+
   /// μ and `pull` times the force line of f, world frame, through a point of a body.  A function,
   /// as g++ leaves a lambda as a call, for which a state goes through memory.
   template <class Momentum, class Motor>
@@ -709,6 +860,13 @@ inline constexpr bool
     is_top<std::tuple<PivotedBody<G, S, split>>, std::tuple<UniformGravity<G, S>>> =
         split.spin_apart;
 
+/// One body on a smooth spring, and nothing else.
+template <class Bodies, class Interactions>
+inline constexpr bool is_on_a_spring = false;
+template <class Body, std::size_t index, class G, class S, class Anchor>
+inline constexpr bool is_on_a_spring<
+    std::tuple<Body>, std::tuple<SpringToWorld<index, G, S, RestLength::zero, Anchor>>> = true;
+
 }  // namespace detail
 
 /// Bodies, each in its principal frame, and what acts on them:
@@ -721,6 +879,11 @@ class RigidBodies;
 /// in every step is found once.
 template <class System>
 class RateForm;
+
+/// The same of bodies that translate, with their position and velocity in the world, where what is
+/// linear is exact: rates turn, in the body's frame, and pushes hold the force over the mass.
+template <class System>
+class WorldForm;
 
 template <class... Body, class... Interaction>
 class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
@@ -822,6 +985,13 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
     return RateForm<RigidBodies>(*this, unit);
   }
 
+  /// And with positions and velocities in the world.
+  [[nodiscard]] constexpr auto in_world(const Scalar& unit) const noexcept
+    requires(Space<Group>::translates)
+  {
+    return WorldForm<RigidBodies>(*this, unit);
+  }
+
   /// What the free motion, H = T, adds in the time h, less the spins that are apart.
   [[nodiscard]] constexpr ChangeOf<RigidBodies> free_change(const Motors& motors,
                                                             const Momenta& momenta,
@@ -894,6 +1064,7 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
 
  private:
   friend RateForm<RigidBodies>;
+  friend WorldForm<RigidBodies>;
 
   template <std::size_t... i>
   [[nodiscard]] static constexpr Momenta free_momentum_rates(const Momenta& momenta,
@@ -1017,6 +1188,146 @@ class RateForm<RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>>> {
                                        std::declval<const Interaction&>(),
                                        std::declval<Forques>()))...>
       interactions_;
+};
+
+template <class... Body, class... Interaction>
+class WorldForm<RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>>> {
+  using System = RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>>;
+  using S = typename System::Scalar;
+  using G = typename System::Group;
+  using Space = hamotor::Space<G>;
+  static constexpr std::size_t n = System::bodies;
+  static constexpr std::size_t rotations = Space::rotations;
+  using Weights = std::array<S, n>;
+  using Each = std::index_sequence_for<Body...>;
+
+ public:
+  using Attitudes = std::array<typename Space::template Attitude<S>, n>;
+  using Vectors = std::array<std::array<S, Space::dimension>, n>;  ///< in the world
+  using Turnings = std::array<std::array<S, rotations>, n>;        ///< in the body's frame
+  using Pushes = std::array<detail::Push<G, S>, n>;
+
+  /// Keeps a reference to the system.
+  constexpr WorldForm(const System& system, const S& unit) noexcept
+      : WorldForm(system, unit, Each{}) {}
+
+  /// `unit` Ω of angular momenta.
+  [[nodiscard]] HAMOTOR_INLINE constexpr Turnings rates(const Turnings& momenta) const noexcept {
+    Turnings result{};
+    for (std::size_t i = 0; i < n; ++i) {
+      for (std::size_t k = 0; k < rotations; ++k) {
+        result[i][k] = per_momentum_[i][k] * momenta[i][k];
+      }
+    }
+    return result;
+  }
+
+  /// unit² Π̇, each component of it in a unit of the system's own, added to `start(i)`: for every
+  /// body components, or nothing; and unit² v̇ in such a unit added to `forces`, or to nothing.
+  template <class Start, class Forces>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Pushes slopes(const Start& start, const Forces& forces,
+                                                       const Attitudes& attitudes,
+                                                       const Vectors& positions,
+                                                       const Turnings& rates) const noexcept {
+    return slopes(start, forces, attitudes, positions, rates, Each{},
+                  std::index_sequence_for<Interaction...>{});
+  }
+
+  /// What such slopes are to be multiplied by for unit² Ω̇.
+  [[nodiscard]] constexpr const Turnings& rate_weights() const noexcept { return rate_weights_; }
+
+  /// And for x unit² Π̇.
+  [[nodiscard]] constexpr Turnings momentum_weights(const S& x) const noexcept {
+    return momentum_weights(x, Each{});
+  }
+
+  /// And the force for unit² v̇.
+  [[nodiscard]] constexpr const S& force_unit() const noexcept { return force_unit_; }
+
+ private:
+  static constexpr bool is_on_a_spring =
+      detail::is_on_a_spring<std::tuple<Body...>, std::tuple<Interaction...>>;
+
+  template <class One>
+  [[nodiscard]] static constexpr auto push_of(const System& system, const One& interaction,
+                                              const Weights& weights) noexcept {
+    if constexpr (is_on_a_spring) {
+      return interaction.push_alone(weights);
+    } else {
+      return detail::push_of(system, interaction, weights);
+    }
+  }
+
+  template <class Components>
+  [[nodiscard]] static constexpr std::array<S, rotations> turning(const Components& x) noexcept {
+    return detail::first<rotations>(x.components());
+  }
+
+  template <std::size_t... i>
+  constexpr WorldForm(const System& system, const S& unit, std::index_sequence<i...>) noexcept
+      : per_momentum_{turning(system.template body<i>().rates_in(unit))...},
+        factors_{system.template body<i>().template slope_factors<System::has_forque>()...},
+        rate_weights_{
+            turning(system.template body<i>().template rate_weights<System::has_forque>())...},
+        system_(system),
+        pushes_(std::apply(
+            [&](const auto&... interaction) {
+              return std::tuple{
+                  push_of(system, interaction,
+                          Weights{system.template body<i>().forque_weight(unit)...})...};
+            },
+            system.interactions_)) {
+    if constexpr (is_on_a_spring) {
+      force_unit_ = std::get<0>(system.interactions_)
+                        .force_unit(Weights{system.template body<i>().forque_weight(unit)...});
+    }
+  }
+
+  [[nodiscard]] static constexpr std::array<S, Space::dimension> force_of(
+      const detail::Nothing&, std::size_t /*body*/) noexcept {
+    return {};
+  }
+  [[nodiscard]] static constexpr const std::array<S, Space::dimension>& force_of(
+      const Vectors& forces, std::size_t body) noexcept {
+    return forces[body];
+  }
+
+  template <class Start, class Forces, std::size_t... i, std::size_t... j>
+  [[nodiscard]] HAMOTOR_INLINE constexpr Pushes slopes(const Start& start, const Forces& forces,
+                                                       const Attitudes& attitudes,
+                                                       const Vectors& positions,
+                                                       const Turnings& rates,
+                                                       std::index_sequence<i...>,
+                                                       std::index_sequence<j...>) const noexcept {
+    Pushes result{detail::Push<G, S>{
+        detail::others_product(start(i), std::get<i>(factors_), rates[i]), force_of(forces, i)}...};
+    if constexpr (System::has_forque) {
+      const std::array<detail::Pose<G, S>, n> poses{
+          detail::Pose<G, S>{attitudes[i], positions[i], Space::half_turn(attitudes[i])}...};
+      (std::get<j>(pushes_).add(poses, result), ...);
+      if constexpr (is_on_a_spring && !std::is_same_v<Forces, detail::Nothing>) {
+        result[0].force = detail::sum_with(result[0].force, detail::One{}, forces[0]);
+      }
+    }
+    return result;
+  }
+
+  template <std::size_t... i>
+  [[nodiscard]] constexpr Turnings momentum_weights(const S& x,
+                                                    std::index_sequence<i...>) const noexcept {
+    return {
+        turning(system_.template body<i>().template momentum_weights<System::has_forque>(x))...};
+  }
+
+  Turnings per_momentum_;
+  std::tuple<decltype(std::declval<Body>().template slope_factors<System::has_forque>())...>
+      factors_;
+  Turnings rate_weights_;
+  const System& system_;
+  S force_unit_{1};
+  std::tuple<decltype(push_of(std::declval<const System&>(), std::declval<const Interaction&>(),
+                              std::declval<Weights>()))...>
+      pushes_;
 };
 
 template <class... Body>
