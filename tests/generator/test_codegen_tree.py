@@ -107,7 +107,7 @@ def test_a_file_formatted_in_pieces_is_the_file_formatted_at_once() -> None:
 
 
 @pytest.mark.long
-def test_products_of_six_dimensions_take_two_processors_five_seconds(tmp_path: Path) -> None:
+def test_products_of_six_dimensions_take_a_processor_less_than_five_seconds(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "hamotor", "generate", "--signature", "6,0,0"]
     environment = os.environ | {"PYTHONPATH": str(ROOT / "generator")}
     before = os.times()
@@ -121,7 +121,7 @@ def test_products_of_six_dimensions_take_two_processors_five_seconds(tmp_path: P
     busy = (
         after.children_user + after.children_system - before.children_user - before.children_system
     )
-    assert busy < 2 * 5.0
+    assert busy < 5.0
 
 
 @pytest.mark.slow

@@ -34,6 +34,10 @@ COMPONENT = re.compile(r"(?<=[(,] )-?[a-z]\w*\.\w+(?=[,)])|(?<=\()-?[a-z]\w*\.\w
 LONG = 3_000
 """Characters of a statement from which on it is given a shorter look."""
 STAND_IN = re.compile(r"\$z+")
+LIST = re.compile(r"(?<=\bdot\()[^()]{260,}(?=\))")
+"""Arguments of a call that fill many lines: which words each holds needs no weighing."""
+LIST_STAND_IN = "$" + 74 * "y"
+WIDTH = 100
 
 
 def formatted(files: Sequence[SourceFile]) -> tuple[SourceFile, ...]:
@@ -63,12 +67,39 @@ def _pieces(text: str) -> list[str]:
 
 
 def _formatted(text: str) -> str:
-    """One piece; where it is long clang-format sees a word of equal length for each component."""
+    """One piece; where it is long clang-format sees one word for a list that fills lines, and one
+    of equal length for every other component.
+    """
     if max(map(len, text.split(";"))) < LONG:
         return clang_format(text)
-    shown = COMPONENT.sub(lambda found: "$".ljust(len(found[0]), "z"), text)
-    components = COMPONENT.finditer(text)
-    return STAND_IN.sub(lambda _: next(components)[0], clang_format(shown))
+    lists = LIST.findall(text)
+    short = LIST.sub(lambda _: LIST_STAND_IN, text)
+    shown = COMPONENT.sub(lambda found: "$".ljust(len(found[0]), "z"), short)
+    components = COMPONENT.finditer(short)
+    before, *others = clang_format(shown).split(LIST_STAND_IN)
+    done = [before]
+    for arguments, after in zip(lists, others, strict=True):
+        column = len(done[-1]) - done[-1].rfind("\n") - 1
+        done += [_filled(arguments, column, after.partition("\n")[0]), after]
+    return STAND_IN.sub(lambda _: next(components)[0], "".join(done))
+
+
+def _filled(arguments: str, column: int, after: str) -> str:
+    """A list of arguments that begins in this column, in as few lines as hold it and what comes
+    after.
+    """
+    words = [f"{word}," for word in re.split(r",\s*", arguments.strip())]
+    words[-1] = words[-1][:-1]
+    text, at = words[0], column + len(words[0])
+    for word in words[1:]:
+        tail = len(after) if word is words[-1] else 0
+        if at + 1 + len(word) + tail > WIDTH:
+            text += f"\n{' ' * column}{word}"
+            at = column + len(word)
+        else:
+            text += f" {word}"
+            at += 1 + len(word)
+    return text
 
 
 def clang_format(text: str) -> str:
