@@ -86,7 +86,7 @@ def _implicit() -> GeneralScene:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["rocket", "conformal_top", "two_bodies", "free4"])
+@pytest.mark.parametrize("name", ["rocket", "conformal_top", "two_bodies@2", "free4"])
 def test_public_solvers_end_where_the_scene_does(name: str) -> None:
     one = problem(name)
     assert one.generated is not None
