@@ -167,6 +167,7 @@ class Library:
             "ad": self.bracket,
             "coadjoint": lambda w, mu: self.bracket(mu, w),
             "kinematics": o.gp,
+            "kinematics_onto": lambda x, m, w: added(x, scaled(2, o.gp(m, w))),
             "Ad": self.sandwich,
             "Ad_star_inverse": self.sandwich,
             "pairing": lambda mu, w: {(): x} if (x := self.pairing(mu, w)) else {},

@@ -7,6 +7,7 @@ from decimal import Context, Decimal
 from hamotor.codegen.algebra import Rational
 from hamotor.codegen.element import Element
 from hamotor.codegen.program import (
+    Accumulation,
     Call,
     Expression,
     MultiplyAdd,
@@ -96,6 +97,8 @@ def _text(expression: Expression) -> tuple[str, int]:
             return f"{_wrapped(a, _PRODUCT)} * {_wrapped(b, _UNARY)}", _PRODUCT
         case Quotient(a, b):
             return f"{_wrapped(a, _PRODUCT)} / {_wrapped(b, _ATOM)}", _PRODUCT
+        case Accumulation():
+            return _accumulation_text(expression), _ATOM
         case MultiplyAdd(_, _, Product() | MultiplyAdd()):
             return f"dot({', '.join(expression_text(x) for x in _chain(expression))})", _ATOM
         case MultiplyAdd(a, b, c):
@@ -113,6 +116,21 @@ def _text(expression: Expression) -> tuple[str, int]:
                 ]
             )
             return f"select({listed})", _ATOM
+
+
+def _accumulation_text(expression: Expression) -> str:
+    """`less(onto(x, a, b, …), c, d, …)`: x + a b + … − c d − …."""
+    inner = expression
+    terms: list[str] = []
+    function = ""
+    while isinstance(inner, Accumulation):
+        a, sign = (inner.a.x, "less") if isinstance(inner.a, Negative) else (inner.a, "onto")
+        if sign != (function or sign):
+            break
+        function = sign
+        terms = [expression_text(a), expression_text(inner.b), *terms]
+        inner = inner.c
+    return f"hamotor::{function}({', '.join([expression_text(inner), *terms])})"
 
 
 def _chain(expression: Expression) -> list[Expression]:

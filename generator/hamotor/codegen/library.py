@@ -28,13 +28,21 @@ from hamotor.codegen.kernel import (
     product_kernel,
     proved,
     quadratic_kernel,
+    read_off,
     reversed_value,
     sandwich_kernel,
     value_of,
 )
 from hamotor.codegen.matrix import matrix_kernels
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
-from hamotor.codegen.program import Call, Parameter
+from hamotor.codegen.program import (
+    Call,
+    Name,
+    Parameter,
+    Program,
+    accumulated,
+    polynomial_expression,
+)
 from hamotor.codegen.spec import AlgebraSpec, Request
 from hamotor.codegen.unit import unit_kernels
 from hamotor.errors import UsageError
@@ -474,7 +482,12 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
             f"{where}: {element.name} does not hold {', '.join(lost)}, which its product with a "
             "generator has; name an element type that the group stays in"
         )
-    kernels += [jacobian.jacobian_kernel(algebra, group, name, where) for name in group.kernels]
+    kernels += [
+        _kinematics_onto(algebra, group)
+        if name == "kinematics_onto"
+        else jacobian.jacobian_kernel(algebra, group, name, where)
+        for name in group.kernels
+    ]
     if algebra.dimension > closedform.MAXIMUM_DIMENSION:
         return kernels
     operations = [
@@ -488,6 +501,25 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
         build = _closed_form(algebra, operation, operand)
         kernels.append(build(algebra, operand, result, namespace, where))
     return kernels
+
+
+def _kinematics_onto(algebra: Algebra, group: LieGroup) -> Kernel:
+    """x + 2 m w, twice because generators are halves of blades: terms then have no factor."""
+    m, w = (Parameter(e.symbol, e) for e in (group.element, group.rate))
+    start = Parameter("start" if "x" in {m.name, w.name} else "x", group.element)
+    twice = apply_bilinear(algebra.geometric, value_of(m), value_of(w))
+    gained = {n: scaled(p, 2) for n, p in read_off(twice, group.element).items()}
+    meaning, outputs = {}, []
+    for name, p in gained.items():
+        meaning[name] = {(f"{start.name}.{name}",): 1, **p}
+        try:
+            total = accumulated(Name(f"{start.name}.{name}"), p)
+        except ValueError:
+            total = polynomial_expression(meaning[name])
+        outputs.append((name, total))
+    law = "x + 2 m w: twice the velocity of m with body rate w, added to x term by term"
+    program = Program((start, m, w), (), tuple(outputs), group.element)
+    return proved(Kernel("kinematics_onto", law, program, meaning, group.rate.namespace))
 
 
 def _simple(algebra: Algebra, operand: Element) -> bool:

@@ -64,6 +64,11 @@ class MultiplyAdd:
 
 
 @dataclass(frozen=True)
+class Accumulation(MultiplyAdd):
+    """a b + c where c is a sum that goes on: in its order, whatever the length of the chain."""
+
+
+@dataclass(frozen=True)
 class Quotient:
     """a / b."""
 
@@ -181,7 +186,7 @@ class Program:
         calls = {kind: n for kind, n in found.items() if isinstance(kind, str)}
         if selects := found[Select]:
             calls["select"] = selects
-        both = found[MultiplyAdd] + exactly_fused
+        both = found[MultiplyAdd] + found[Accumulation] + exactly_fused
         split = sum(_split_sums(x) for _, x in (*self.bindings, *self.outputs))
         return Cost(
             mul=found[Product] + both,
@@ -275,7 +280,7 @@ def _split_sums(expression: Expression, inside: bool = False) -> int:
     inside: the expression is the rest of a longer chain.
     """
     found = 0
-    if isinstance(expression, MultiplyAdd) and not inside:
+    if type(expression) is MultiplyAdd and not inside:
         products = 0
         rest: Expression = expression
         while isinstance(rest, MultiplyAdd):
@@ -385,6 +390,20 @@ def sum_of_products(terms: list[tuple[Expression, ...]]) -> Expression:
         return number(0)
     for a, b in double:
         total = MultiplyAdd(a, b, total)
+    return total
+
+
+def accumulated(start: Expression, polynomial: Polynomial) -> Expression:
+    """start + Σ, in one chain of multiply-adds: what is added before what is subtracted, so that no
+    factor's sign is changed.  ValueError where coefficients are not ±1 or terms no products."""
+    total = start
+    for sign in (1, -1):
+        for monomial, coefficient in polynomial.items():
+            if len(monomial) != 2 or abs(coefficient) != 1:
+                raise ValueError(f"{coefficient} {monomial} is no product of two")
+            if coefficient == sign:
+                a, b = map(Name, monomial)
+                total = Accumulation(a if sign > 0 else Negative(a), b, total)
     return total
 
 

@@ -66,7 +66,7 @@ LEAN_FUNCTIONS = ("exp", "log", "cayley", "cayley_inverse")
 CHAINS = ("gp", "outer", "regressive")
 """Associative operations, which take any number of operands from two on."""
 MAXIMUM_CHAIN = 6
-GROUP_KERNELS = ("dexp", "dexp_inverse")
+GROUP_KERNELS = ("dexp", "dexp_inverse", "kinematics_onto")
 """What a group's `kernels` may list; its other functions every group has."""
 
 

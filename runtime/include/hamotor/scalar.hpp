@@ -106,18 +106,30 @@ template <class S>
   }
 }
 
-namespace detail {
-
+/// sum + a₁ b₁ + a₂ b₂ + …, in one sum: no addition but those of the products, as becomes lanes,
+/// where other blocks' operations fill the time in which these wait.
 template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr S dot_onto(const S& sum) noexcept {
+[[nodiscard]] HAMOTOR_INLINE constexpr S onto(const S& sum) noexcept {
   return sum;
 }
-
 template <class S, class... Rest>
-[[nodiscard]] HAMOTOR_INLINE constexpr S dot_onto(const S& sum, const S& a, const S& b,
-                                                  const Rest&... rest) noexcept {
-  return dot_onto(mul_add(a, b, sum), rest...);
+[[nodiscard]] HAMOTOR_INLINE constexpr S onto(const S& sum, const S& a, const S& b,
+                                              const Rest&... rest) noexcept {
+  return onto(mul_add(a, b, sum), rest...);
 }
+
+/// sum − a₁ b₁ − a₂ b₂ − ….
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum) noexcept {
+  return sum;
+}
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum, const S& a, const S& b,
+                                              const Rest&... rest) noexcept {
+  return less(less_product(a, b, sum), rest...);
+}
+
+namespace detail {
 
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot_in_turn(const S& odd, const S& even) noexcept {
@@ -163,7 +175,7 @@ template <class S, class... Rest>
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot_of_products(const S& a, const S& b,
                                                          const Rest&... rest) noexcept {
-  return dot_onto(a * b, rest...);
+  return onto(a * b, rest...);
 }
 
 template <class S, class... Rest>
@@ -184,7 +196,7 @@ template <class S, class... Rest>
 
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S dot_from(const S& x, const Rest&... rest) noexcept {
-  return dot_onto(x, rest...);
+  return onto(x, rest...);
 }
 
 template <class S, class... Rest>

@@ -72,33 +72,19 @@ struct Nothing {
   [[nodiscard]] HAMOTOR_INLINE constexpr Zero operator[](std::size_t) const noexcept { return {}; }
 };
 
-/// start + a₁ b₁ + a₂ b₂ + …, in one sum: no addition but those of the products, as becomes lanes,
-/// where other blocks' operations fill the time in which these wait.
-template <class S, class... Rest>
-[[nodiscard]] HAMOTOR_INLINE constexpr S onto(const S& start, const Rest&... rest) noexcept {
-  return dot_onto(start, rest...);
-}
+/// The same of nothing.
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S onto(Nothing::Zero, const S& a, const S& b,
                                               const Rest&... rest) noexcept {
-  return dot_onto(a * b, rest...);
-}
-
-/// sum − a₁ b₁ − a₂ b₂ − ….
-template <class S>
-[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum) noexcept {
-  return sum;
-}
-template <class S, class... Rest>
-[[nodiscard]] HAMOTOR_INLINE constexpr S less(const S& sum, const S& a, const S& b,
-                                              const Rest&... rest) noexcept {
-  return less(less_product(a, b, sum), rest...);
+  return hamotor::onto(a * b, rest...);
 }
 template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S less(Nothing::Zero, const S& a, const S& b,
                                               const Rest&... rest) noexcept {
-  return less(-(a * b), rest...);
+  return hamotor::less(-(a * b), rest...);
 }
+using hamotor::less;
+using hamotor::onto;
 
 /// The products of components, and what they add to others; types of as many components.
 template <class T, class Other>
@@ -323,26 +309,6 @@ struct Space<pga3::SE3> {
             less(onto(start[3], a[1], w[1]), a[0], w[2], a[2], w[0])};
   }
 
-  /// `start` and 2 M B of a rate B.
-  template <class Start, class S, class Rate>
-  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Motor<S> with_twice_velocity(
-      const Start& start, const pga3::Motor<S>& m, const Rate& w) noexcept {
-    using detail::less;
-    using detail::onto;
-    return {onto(start[0], m.e23, w.w23, m.e31, w.w31, m.e12, w.w12),
-            less(onto(start[1], m.e31, w.w12), m.s, w.w23, m.e12, w.w31),
-            less(onto(start[2], m.e12, w.w23), m.s, w.w31, m.e23, w.w12),
-            less(onto(start[3], m.e23, w.w31), m.s, w.w12, m.e31, w.w23),
-            less(onto(start[4], m.e31, w.v3, m.e02, w.w12, m.e0123, w.w23), m.s, w.v1, m.e12, w.v2,
-                 m.e03, w.w31),
-            less(onto(start[5], m.e12, w.v1, m.e03, w.w23, m.e0123, w.w31), m.s, w.v2, m.e23, w.v3,
-                 m.e01, w.w12),
-            less(onto(start[6], m.e23, w.v2, m.e01, w.w31, m.e0123, w.w12), m.s, w.v3, m.e31, w.v1,
-                 m.e02, w.w23),
-            less(start[7], m.e23, w.v1, m.e31, w.v2, m.e12, w.v3, m.e01, w.w23, m.e02, w.w31, m.e03,
-                 w.w12)};
-  }
-
   /// M put back on the group, by −½ (M ~M − 1) M, and the largest coefficient of M ~M − 1.
   template <class S>
   HAMOTOR_INLINE static constexpr S put_back(pga3::Motor<S>& m) noexcept {
@@ -436,18 +402,6 @@ struct Space<pga3::SO3> {
   [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Point<S> scaled(
       const Factor& a, const pga3::Point<S>& x) noexcept {
     return {a * x.e032, a * x.e013, a * x.e021};
-  }
-
-  /// `start` and 2 M B of a rate B.
-  template <class Start, class S, class Rate>
-  [[nodiscard]] HAMOTOR_INLINE static constexpr pga3::Rotor<S> with_twice_velocity(
-      const Start& start, const pga3::Rotor<S>& m, const Rate& w) noexcept {
-    using detail::less;
-    using detail::onto;
-    return {onto(start[0], m.e23, w.w23, m.e31, w.w31, m.e12, w.w12),
-            less(onto(start[1], m.e31, w.w12), m.s, w.w23, m.e12, w.w31),
-            less(onto(start[2], m.e12, w.w23), m.s, w.w31, m.e23, w.w12),
-            less(onto(start[3], m.e23, w.w31), m.s, w.w12, m.e31, w.w23)};
   }
 
   /// M put back on the group, by −½ (M ~M − 1) M, and |M ~M − 1|.
@@ -555,17 +509,6 @@ struct Space<pga2::SE2> {
   [[nodiscard]] HAMOTOR_INLINE static constexpr Attitude<S> with_twice_turning(
       const Start& start, const Attitude<S>& a, const std::array<S, 1>& w) noexcept {
     return {detail::onto(start[0], a[1], w[0]), detail::less(start[1], a[0], w[0])};
-  }
-
-  /// `start` and 2 M B of a rate B.
-  template <class Start, class S, class Rate>
-  [[nodiscard]] HAMOTOR_INLINE static constexpr pga2::Motor<S> with_twice_velocity(
-      const Start& start, const pga2::Motor<S>& m, const Rate& w) noexcept {
-    using detail::less;
-    using detail::onto;
-    return {onto(start[0], m.e12, w.w12), less(start[1], m.s, w.w12),
-            less(onto(start[2], m.e02, w.w12), m.s, w.v1, m.e12, w.v2),
-            less(onto(start[3], m.e12, w.v1), m.s, w.v2, m.e01, w.w12)};
   }
 
   /// M put back on the group, by −½ (M ~M − 1) M, and |M ~M − 1|.

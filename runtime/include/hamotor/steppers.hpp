@@ -419,7 +419,7 @@ class MomentumStages {
 template <RateSystem System, Summation summation>
 class RateStages {
   using S = typename System::Scalar;
-  using Space = hamotor::Space<typename System::Group>;
+  using Motor = typename System::Group::template Element<S>;
   static constexpr std::size_t n = System::bodies;
 
  public:
@@ -467,11 +467,10 @@ class RateStages {
     for (std::size_t i = 0; i < n; ++i) {
       if constexpr (sums_places) {
         const auto rate = halves == 2 ? here.rates[i] + here.rates[i] : here.rates[i];
-        there.motors[i] =
-            Space::with_twice_velocity(start.motors[i].components(), here.motors[i], rate);
+        there.motors[i] = kinematics_onto(start.motors[i], here.motors[i], rate);
         along.motors[i] = there.motors[i];
       } else {
-        along.motors[i] = Space::with_twice_velocity(Nothing{}, here.motors[i], here.rates[i]);
+        along.motors[i] = kinematics_onto(Motor{}, here.motors[i], here.rates[i]);
         there.motors[i] = mul_add(S(halves), along.motors[i], start.motors[i]);
       }
     }
@@ -490,8 +489,7 @@ class RateStages {
     note_evaluations<S>(1);
     sum.momenta = form_.slopes(start, here.motors, here.rates);
     for (std::size_t i = 0; i < n; ++i) {
-      sum.motors[i] =
-          Space::with_twice_velocity(sum.motors[i].components(), here.motors[i], here.rates[i]);
+      sum.motors[i] = kinematics_onto(sum.motors[i], here.motors[i], here.rates[i]);
       if constexpr (sums_places) sum.motors[i] = sum.motors[i] + sum.later[i];
     }
   }
