@@ -39,6 +39,8 @@ CORRECTLY_ROUNDED = frozenset(
         "scaling",
         "compensated_dot",
         "compensated_dot_pair",
+        "compensated_dot_where",
+        "compensated_sum",
         "double_word_ratio",
     }
 )

@@ -85,6 +85,7 @@ ARITHMETIC: dict[str, Callable[..., Any]] = {
     "max_abs": lambda *values: max(abs(x) for x in values),
     "scaling": lambda _: SimpleNamespace(**{"in": 1, "out": 1, "root_in": 1, "root_out": 1}),
     "compensated_dot": dot,
+    "compensated_dot_where": lambda _, *factors: dot(*factors),
     "compensated_dot_pair": lambda *factors: SimpleNamespace(hi=dot(*factors), lo=0),
     "double_word_ratio": lambda a, b: SimpleNamespace(hi=a.hi / b.hi, lo=0),
 }

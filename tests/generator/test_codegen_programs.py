@@ -17,6 +17,7 @@ from hamotor.codegen.kernel import Kernel, proved
 from hamotor.codegen.lanes import packed_lines
 from hamotor.codegen.library import library
 from hamotor.codegen.program import (
+    Call,
     Cost,
     Expression,
     MultiplyAdd,
@@ -189,6 +190,42 @@ def test_sums_of_products_fuse_onto_what_is_not_a_product() -> None:
     assert halves == Product(number(Fraction(1, 2)), MultiplyAdd(a, b, Negative(c)))
     with pytest.raises(ValueError, match="more than two factors"):
         polynomial_expression({("a", "b", "c"): 1})
+
+
+def roundings(expression: Expression) -> int:
+    """How often what is multiplied is rounded at most, until it is part of the result."""
+    match expression:
+        case Name() | Number():
+            return 0
+        case Negative(x) | Product(Number(), x):
+            return roundings(x)
+        case Product(a, b) | Sum(a, b):
+            return 1 + max(roundings(a), roundings(b))
+        case Call("compensated_sum" | "compensated_dot", arguments):
+            return 1 + max(map(roundings, arguments))
+        case MultiplyAdd():
+            terms: list[int] = []
+            while isinstance(expression, MultiplyAdd):
+                terms.append(max(roundings(expression.a), roundings(expression.b)))
+                expression = expression.c
+            last = expression
+            first = max(map(roundings, (last.a, last.b))) if isinstance(last, Product) else -1
+            terms.append(first if first >= 0 else roundings(last) - 1)
+            sums = 1 if len(terms) < 4 else 2 if len(terms) < 9 else 4
+            return max(
+                own + len(range(index, len(terms), sums)) + sums // 2
+                for index, own in enumerate(reversed(terms))
+            )
+    raise AssertionError(expression)
+
+
+def test_no_product_is_rounded_more_than_four_times_in_a_result_of_one_number() -> None:
+    single = [k for _, k in KERNELS if k.meaning and len(k.program.outputs) == 1]
+    assert len(single) > 40
+    for kernel in single:
+        ((_, expression),) = kernel.program.outputs
+        assert not kernel.program.bindings
+        assert roundings(expression) <= 4, kernel
 
 
 def exact_dot(*factors: Fraction) -> Fraction:

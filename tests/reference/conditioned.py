@@ -75,15 +75,6 @@ DEFINED = ("exp", "log", "sqrt", "cayley_inverse", "cayley", "inverse", "norm", 
 
 SANDWICHES = ("sandwich", "Ad", "Ad_star_inverse")
 
-EXCEEDING = {("exp", "cga3"), ("cayley_inverse", "cga3"), ("pairing", "cga3")}
-"""Functions that exceed their bound at rare points, a few of 10⁵: not known until other points were
-drawn."""
-
-EXCEPTION = """\
-† Above its bound at rare points: exp and cayley_inverse only on the whole conformal group, such as
-where the squares of a rotation and a boost nearly cancel; the pairing there, a sum of ten products,
-by a twentieth."""
-
 BOUNDS = {True: 2.0, False: 4.0}
 """Units of the condition that a polynomial kernel, and any other, may be off."""
 
@@ -509,13 +500,13 @@ def worst_defect(algebra: str, points: int, *, fused: bool) -> dict[str, float]:
 
 def excepted(found: KernelMeasurement) -> bool:
     """Whether no bound is claimed for this kernel, whose function the table marks."""
-    return _mark(found.kernel.name, found.algebra) != ""
+    return _mark(found.kernel.name) != ""
 
 
 def published(table: str) -> dict[tuple[str, str, str], float]:
     """Function name, algebra and scalar → the largest error in the second table of ulp.md."""
     rows = re.findall(
-        r"^\| `(\w+)`(?: [†‡])? \| (\w+) \| \d+ \| (\S+) \| \S+ \| (\S+) \|", table, re.MULTILINE
+        r"^\| `(\w+)`(?: ‡)? \| (\w+) \| \d+ \| (\S+) \| \S+ \| (\S+) \|", table, re.MULTILINE
     )
     return {
         (name, algebra, scalar): float(error)
@@ -524,9 +515,7 @@ def published(table: str) -> dict[tuple[str, str, str], float]:
     }
 
 
-def _mark(name: str, algebra: str) -> str:
-    if (name, algebra) in EXCEEDING:
-        return " †"
+def _mark(name: str) -> str:
     return " ‡" if name.endswith("_lean") else ""
 
 
@@ -580,7 +569,7 @@ def table(found: Sequence[KernelMeasurement], before: str = "") -> str:
         rows[polynomial][name, algebra] = _cells(of_one)
     measured = {m.algebra for m in found}
     for name, algebra, cells in re.findall(
-        r"^\| `(\w+)`(?: [†‡])? \| (\w+) \| (.*) \|$", before, re.MULTILINE
+        r"^\| `(\w+)`(?: ‡)? \| (\w+) \| (.*) \|$", before, re.MULTILINE
     ):
         if algebra not in measured:
             rows[is_product(name)][name, algebra] = cells
@@ -592,8 +581,7 @@ def table(found: Sequence[KernelMeasurement], before: str = "") -> str:
             "|---|---|---|---|---|---|---|---|",
         ]
         for (name, algebra), cells in sorted(of_kind.items()):
-            lines.append(f"| `{name}`{_mark(name, algebra)} | {algebra} | {cells} |")
+            lines.append(f"| `{name}`{_mark(name)} | {algebra} | {cells} |")
         blocks.append("\n".join(lines))
-    blocks.append(EXCEPTION)
     blocks.append("‡ The fewest operations: no bound is claimed; see each kernel's documentation.")
     return "\n\n".join(blocks)

@@ -311,12 +311,13 @@ template <class S>
 
 /// pairing: Momentum Rate -> Scalar
 /// μ(w) = (μ ∧ w) / I: twice the kinetic energy if w is the rate of μ.
-/// Cost: 10 mul, 9 add (6 fused).
+/// Cost: 10 mul, 7 add (5 fused), 1 compensated_sum.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S pairing(const so41::Momentum<S>& mu,
                                                  const so41::Rate<S>& w) noexcept {
-  return dot(mu.l23, w.w23, mu.l31, w.w31, mu.l12, w.w12, mu.p1, w.v1, mu.p2, w.v2, mu.p3, w.v3,
-             mu.q, w.d, mu.k1, w.u1, mu.k2, w.u2, mu.k3, w.u3);
+  return scalar::compensated_sum(dot(mu.l23, w.w23, mu.l31, w.w31, mu.l12, w.w12, mu.p1, w.v1),
+                                 dot(mu.p2, w.v2, mu.p3, w.v3, mu.q, w.d, mu.k1, w.u1),
+                                 dot(mu.k2, w.u2, mu.k3, w.u3));
 }
 
 /// dexp: Rate Rate -> Rate
@@ -385,7 +386,8 @@ template <class S>
 /// exp: Rate -> Versor
 /// exp(B) = 1 + B + B²/2 + ….
 /// Any bivector: two commuting rotations or boosts, isoclinic, simple or null.
-/// Cost: 118 mul, 66 add (62 fused), 1 div, 1 bivector_exponential, 2 select, 1 sqrt.
+/// Cost: 129 mul, 73 add (67 fused), 1 div, 2 abs, 1 bivector_exponential, 5 compensated_dot_where,
+/// 2 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> exp(const so41::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.u1;
@@ -398,11 +400,27 @@ template <class S>
   const S b_e1i = S(0.5) * -w.v1;
   const S b_e2i = S(0.5) * -w.v2;
   const S b_e3i = S(0.5) * -w.v3;
-  const S w_e0123 = dot(b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
-  const S w_e012i = dot(b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
-  const S w_e013i = dot(b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
-  const S w_e023i = dot(b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
-  const S w_e123i = dot(b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
+  const S rough_e0123 = dot(b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
+  const S rough_e012i = dot(b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
+  const S rough_e013i = dot(b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
+  const S rough_e023i = dot(b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
+  const S rough_e123i = dot(b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
+  const S cancels =
+      mul_add(S(0.0625),
+              dot(S(2), scalar::abs(rough_e0123 * rough_e123i), rough_e012i, rough_e012i,
+                  rough_e013i, rough_e013i, rough_e023i, rough_e023i),
+              -scalar::abs(dot(-rough_e012i, rough_e012i, -rough_e013i, rough_e013i, -rough_e023i,
+                               rough_e023i, S(2), rough_e0123 * rough_e123i)));
+  const S w_e0123 =
+      scalar::compensated_dot_where(cancels, b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
+  const S w_e012i =
+      scalar::compensated_dot_where(cancels, b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
+  const S w_e013i =
+      scalar::compensated_dot_where(cancels, b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
+  const S w_e023i =
+      scalar::compensated_dot_where(cancels, b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
+  const S w_e123i =
+      scalar::compensated_dot_where(cancels, b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
   const S square = dot(-b_e12, b_e12, -b_e13, b_e13, -b_e23, b_e23, b_e0i, b_e0i, S(2),
                        dot(-b_e01, b_e1i, -b_e02, b_e2i, -b_e03, b_e3i));
   const S omega =
@@ -538,7 +556,8 @@ template <class S>
 /// cayley: Rate -> Versor
 /// (1 + B)(1 − B)⁻¹.
 /// Infinite where 1 − B has no inverse: only where B² has an eigenvalue 1 (a boost).
-/// Cost: 125 mul, 74 add (65 fused), 2 div, 1 max_abs, 5 select, 1 sqrt.
+/// Cost: 136 mul, 81 add (70 fused), 2 div, 2 abs, 5 compensated_dot_where, 1 max_abs, 5 select, 1
+/// sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> cayley(const so41::Rate<S>& w) noexcept {
   const S b_e01 = S(0.5) * -w.u1;
@@ -551,11 +570,27 @@ template <class S>
   const S b_e1i = S(0.5) * -w.v1;
   const S b_e2i = S(0.5) * -w.v2;
   const S b_e3i = S(0.5) * -w.v3;
-  const S w_e0123 = dot(b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
-  const S w_e012i = dot(b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
-  const S w_e013i = dot(b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
-  const S w_e023i = dot(b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
-  const S w_e123i = dot(b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
+  const S rough_e0123 = dot(b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
+  const S rough_e012i = dot(b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
+  const S rough_e013i = dot(b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
+  const S rough_e023i = dot(b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
+  const S rough_e123i = dot(b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
+  const S cancels =
+      mul_add(S(0.0625),
+              dot(S(2), scalar::abs(rough_e0123 * rough_e123i), rough_e012i, rough_e012i,
+                  rough_e013i, rough_e013i, rough_e023i, rough_e023i),
+              -scalar::abs(dot(-rough_e012i, rough_e012i, -rough_e013i, rough_e013i, -rough_e023i,
+                               rough_e023i, S(2), rough_e0123 * rough_e123i)));
+  const S w_e0123 =
+      scalar::compensated_dot_where(cancels, b_e01, b_e23, -b_e02, b_e13, b_e03, b_e12);
+  const S w_e012i =
+      scalar::compensated_dot_where(cancels, b_e01, b_e2i, -b_e02, b_e1i, b_e0i, b_e12);
+  const S w_e013i =
+      scalar::compensated_dot_where(cancels, b_e01, b_e3i, -b_e03, b_e1i, b_e0i, b_e13);
+  const S w_e023i =
+      scalar::compensated_dot_where(cancels, b_e02, b_e3i, -b_e03, b_e2i, b_e0i, b_e23);
+  const S w_e123i =
+      scalar::compensated_dot_where(cancels, b_e12, b_e3i, -b_e13, b_e2i, b_e1i, b_e23);
   const S square = dot(-b_e12, b_e12, -b_e13, b_e13, -b_e23, b_e23, b_e0i, b_e0i, S(2),
                        dot(-b_e01, b_e1i, -b_e02, b_e2i, -b_e03, b_e3i));
   const S omega =
@@ -616,7 +651,7 @@ template <class S>
 /// cayley_inverse: Versor -> Rate
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 130 mul, 87 add (76 fused), 4 div, 1 abs, 6 select, 1 sqrt.
+/// Cost: 100 mul, 67 add (56 fused), 4 div, 1 abs, 10 compensated_dot_where, 6 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr so41::Rate<S> cayley_inverse(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -626,19 +661,29 @@ template <class S>
                                (S(1) - m.s));
   const S omega =
       dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
-  const S t_e1i = dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
-  const S t_e0i = dot(m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
-  const S t_e01 = dot(-m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
-  const S t_e2i = dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
-  const S t_e02 = dot(-m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
-  const S t_e3i = dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
-  const S t_e03 = dot(-m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
-  const S t_e23 = dot(-m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
-  const S t_e13 = dot(m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
-  const S t_e12 = dot(-m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
   const S root_omega = scalar::sqrt(omega);
   const S isoclinic = mul_add(S(-0.25) * shifted, shifted, omega);
   const S share = select(isoclinic > S(0), select(shifted > S(0), S(-1), S(1)) / root_omega, S(0));
+  const S t_e1i =
+      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
+  const S t_e0i =
+      scalar::compensated_dot_where(isoclinic, m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+  const S t_e01 =
+      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
+  const S t_e2i =
+      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
+  const S t_e02 =
+      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
+  const S t_e3i =
+      scalar::compensated_dot_where(isoclinic, -m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
+  const S t_e03 =
+      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
+  const S t_e23 =
+      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
+  const S t_e13 =
+      scalar::compensated_dot_where(isoclinic, m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
+  const S t_e12 =
+      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
   const S u_e23 = mul_add(share, t_e23, m.e23);
   const S u_e13 = mul_add(share, t_e13, -m.e31);
   const S u_e12 = mul_add(share, t_e12, m.e12);

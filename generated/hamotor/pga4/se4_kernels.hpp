@@ -274,12 +274,13 @@ template <class S>
 
 /// pairing: Momentum Rate -> Scalar
 /// μ(w) = (μ ∧ w) / I: twice the kinetic energy if w is the rate of μ.
-/// Cost: 10 mul, 9 add (6 fused).
+/// Cost: 10 mul, 7 add (5 fused), 1 compensated_sum.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S pairing(const se4::Momentum<S>& mu,
                                                  const se4::Rate<S>& w) noexcept {
-  return dot(mu.l12, w.w12, mu.l13, w.w13, mu.l14, w.w14, mu.l23, w.w23, mu.l24, w.w24, mu.l34,
-             w.w34, mu.p1, w.v1, mu.p2, w.v2, mu.p3, w.v3, mu.p4, w.v4);
+  return scalar::compensated_sum(dot(mu.l12, w.w12, mu.l13, w.w13, mu.l14, w.w14, mu.l23, w.w23),
+                                 dot(mu.l24, w.w24, mu.l34, w.w34, mu.p1, w.v1, mu.p2, w.v2),
+                                 dot(mu.p3, w.v3, mu.p4, w.v4));
 }
 
 /// dexp: Rate Rate -> Rate

@@ -29,6 +29,7 @@ from hamotor.codegen.program import (
     Quotient,
     Select,
     Sum,
+    factors_of,
     negative,
     number,
     polynomial_expression,
@@ -41,6 +42,8 @@ ONE = number(1)
 MAXIMUM_DIMENSION = 5
 NOT_SMALL = Fraction(2, 3)
 """Where ω > S²/4 and √ω is below half of this, |S| + √ω ≤ 1: exp is a series there."""
+CANCELLED = Fraction(1, 16)
+"""What is left of ω's terms where W is needed with all its digits."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +64,7 @@ def square_of(
     algebra: Algebra, writer: Writer, square: PolynomialMultivector, names: str, where: str
 ) -> Square:
     """Bind S, W and ω of a square; raises UsageError where it is not a number plus grade 4."""
-    quad = {
-        b: writer.let_polynomial(f"{names}_{algebra.blade_name(b)}", p)
-        for b, p in sorted(square.items())
-        if b
-    }
+    quad = _named(algebra, writer, names, {b: p for b, p in sorted(square.items()) if b})
     omega = poly.apply_bilinear(algebra.geometric, quad, quad)
     if any(grade(b) != 4 for b in quad) or any(omega.keys() - {0}):
         raise UsageError(
@@ -78,6 +77,50 @@ def square_of(
     quad = {b: poly.scaled(p, ratio(1, content)) for b, p in quad.items()}
     number_part = writer.let_polynomial("square", square.get(0, {}))
     return Square(number_part, quad, content, writer.let_polynomial("omega", omega.get(0, {})))
+
+
+def _with_all_digits(
+    algebra: Algebra, writer: Writer, square: PolynomialMultivector
+) -> PolynomialMultivector:
+    """The square, its part W of grade 4 under names; compensated where ω = W² nearly cancels.
+
+    It cannot, if all its terms have one sign.  Otherwise, as where two planes are turned by a large
+    boost, ω feels rounding errors of W more than B: it changes by 2 <B W>₂ δB, where |B W| may be
+    much less than |B| |W|.
+    """
+    quad = {b: p for b, p in sorted(square.items()) if b}
+    independent: PolynomialMultivector = {b: {(f"{b}",): 1} for b in quad}
+    if not (_may_be_isoclinic(algebra, independent) and _may_be_negative(algebra, independent)):
+        return square
+    rough = _named(algebra, writer, "rough", quad)
+    omega = poly.apply_bilinear(algebra.geometric, rough, rough).get(0, {})
+    omega = poly.scaled(omega, ratio(1, magnitude(poly.content(omega))))
+    sizes: list[tuple[Expression, ...]] = []
+    for (x, y), factor in omega.items():
+        size = magnitude(factor)
+        if x == y and size == 1:
+            sizes.append((Name(x), Name(y)))
+        else:
+            sizes.append((number(size), Call("abs", (Product(Name(x), Name(y)),))))
+    left = Call("abs", (polynomial_expression(omega),))
+    needed = MultiplyAdd(number(CANCELLED), sum_of_products(sizes), negative(left))
+    cancels = writer.let("cancels", needed)
+    return {0: square.get(0, {})} | {
+        b: _let_compensated(writer, f"w_{algebra.blade_name(b)}", p, cancels)
+        if len(p) > 1
+        else rough[b]
+        for b, p in quad.items()
+    }
+
+
+def _let_compensated(writer: Writer, name: str, p: Polynomial, needed: Expression) -> Polynomial:
+    """`let_polynomial`, of products whose sum is compensated where `needed` > 0."""
+    if len(p) < 2:
+        return writer.let_polynomial(name, p)
+    content = poly.content(p)
+    factors = factors_of(poly.scaled(p, ratio(1, content)))
+    writer.bindings.append((name, Call("compensated_dot_where", (needed, *factors))))
+    return {(name,): content}
 
 
 def _times(content: Rational, expression: Expression) -> Expression:
@@ -138,7 +181,7 @@ def exp_kernel(
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
     square = poly.apply_bilinear(algebra.geometric, b, b)
-    parts = square_of(algebra, writer, square, "w", where)
+    parts = square_of(algebra, writer, _with_all_digits(algebra, writer, square), "w", where)
     twisted = _twisted(algebra, b, parts.quad)
     negated = {x: poly.scaled(p, -1) for x, p in square.items()}
     planes = _on_planes(algebra, writer, negated, parts.quad)
@@ -208,13 +251,20 @@ def _isoclinic(
     twisted: PolynomialMultivector,
     least: Rational = 0,
 ) -> Isoclinic:
-    """twisted: <B W>₂ / content, over names.  least: √ω is small below half of it."""
+    """twisted: <B W>₂ / content; its sums that have no name yet are compensated where they matter.
+
+    least: √ω is small below half of it.
+    """
     root = writer.let("root_omega", Call("sqrt", (omega,)))
     size = writer.let("size", Call("max_abs", (s, number(least)))) if least else s
     quarter = Product(number(Fraction(-1, 4)), size)
     applies = writer.let("isoclinic", MultiplyAdd(quarter, size, omega))
     sign = Select(s, negative(content), content)
     share = writer.let("share", Select(applies, Quotient(sign, root), number(0)))
+    twisted = {
+        b: _let_compensated(writer, f"t_{algebra.blade_name(b)}", p, applies)
+        for b, p in twisted.items()
+    }
     cancelled: PolynomialMultivector = {}
     for blade, p in bivector.items():
         part = MultiplyAdd(
@@ -383,7 +433,7 @@ def cayley_kernel(
     writer = Writer()
     b = _bivector(algebra, writer, parameter, where)
     square = poly.apply_bilinear(algebra.geometric, b, b)
-    parts = square_of(algebra, writer, square, "w", where)
+    parts = square_of(algebra, writer, _with_all_digits(algebra, writer, square), "w", where)
     one: Polynomial = {(): 1}
     s = polynomial_expression(parts.number)
     twisted = _twisted(algebra, b, parts.quad)
@@ -911,7 +961,7 @@ def _norm_squared(
         return MultiplyAdd(n, n, negative(omega))
     bivector = {b: p for b, p in value.items() if grade(b) == 2}
     omega = writer.let("omega", omega)
-    twisted = _named(algebra, writer, "t", _twisted(algebra, bivector, quad))
+    twisted = _twisted(algebra, bivector, quad)
     isoclinic = _isoclinic(algebra, writer, bivector, n, omega, ONE, twisted)
     side = writer.let("side", isoclinic.side)
     cosine = writer.let("cosine", Sum(polynomial_expression(value[0]), side))

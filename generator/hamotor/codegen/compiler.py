@@ -203,7 +203,8 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
     cost = kernel.program.cost
     whole = cost.total + _operations_of_calls(kernel.program)
     inlined = cost.total <= INLINED_OPERATIONS and (
-        not cost.calls or (kernel.meaning is None and whole <= INLINED_WITH_CALLS)
+        not cost.calls.keys() - {"compensated_sum"}
+        or (kernel.meaning is None and whole <= INLINED_WITH_CALLS)
     )
     return {
         "title": kernel_title(kernel),

@@ -34,6 +34,7 @@ from hamotor.codegen.program import (
     Program,
     Sum,
     number,
+    number_expression,
     polynomial_expression,
 )
 
@@ -103,7 +104,8 @@ def direct_program(
     parameters: tuple[Parameter, ...], meaning: Mapping[str, Polynomial], result: Element | None
 ) -> Program:
     """The program that evaluates each polynomial as it stands."""
-    outputs = tuple((name, polynomial_expression(p)) for name, p in meaning.items())
+    expression = number_expression if len(meaning) == 1 else polynomial_expression
+    outputs = tuple((name, expression(p)) for name, p in meaning.items())
     return Program(parameters, (), outputs, result)
 
 

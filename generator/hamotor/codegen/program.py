@@ -312,6 +312,11 @@ def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomi
             total = _expand(c, known)
             add_scaled(total, times(_expand(a, known), _expand(b, known)), 1)
             return total
+        case Call("compensated_sum", arguments):
+            total = {}
+            for x in arguments:
+                add_scaled(total, _expand(x, known), 1)
+            return total
         case Call("compensated_dot", arguments):
             total = {}
             for a, b in zip(arguments[::2], arguments[1::2], strict=True):
@@ -431,3 +436,35 @@ def polynomial_expression(polynomial: Polynomial) -> Expression:
     if not unscaled and len(terms) == 1:
         return Product(*terms[0])
     return sum_of_products([*unscaled, *terms])
+
+
+def number_expression(polynomial: Polynomial) -> Expression:
+    """An expression for a polynomial of degree two, none of whose products is rounded often.
+
+    At most four times, so that the error is at most 2 ε Σ|terms|; `dot` rounds the first of seven
+    to twelve products five times.  For results of one number, beside which no larger one stands.
+    """
+    if len(polynomial) <= 6:
+        return polynomial_expression(polynomial)
+    groups: dict[Rational, list[Polynomial]] = {}
+    for monomial, coefficient in polynomial.items():
+        pieces = groups.setdefault(magnitude(coefficient), [{}])
+        if len(pieces[-1]) == 4:
+            pieces.append({})
+        pieces[-1][monomial] = coefficient
+    sums = [polynomial_expression(piece) for pieces in groups.values() for piece in pieces]
+    return Sum(*sums) if len(sums) == 2 else Call("compensated_sum", tuple(sums))
+
+
+def factors_of(polynomial: Polynomial) -> tuple[Expression, ...]:
+    """The factors of its terms of degree 0 and 2, two by two, as arguments of `compensated_dot`."""
+    factors: list[Expression] = []
+    for monomial, x in sorted(polynomial.items(), key=lambda term: len(term[0])):
+        if not monomial:
+            factors += [number(x), number(1)]
+            continue
+        a, b = (Name(text) for text in monomial)
+        size = magnitude(x)
+        first: Expression = a if size == 1 else Product(number(size), a)
+        factors += [first if x > 0 else negative(first), b]
+    return tuple(factors)

@@ -25,7 +25,7 @@ from hamotor.codegen.program import (
     Parameter,
     Product,
     Program,
-    negative,
+    factors_of,
     number,
     polynomial_expression,
 )
@@ -68,16 +68,7 @@ def unit_kernels(algebra: Algebra, element: Element) -> tuple[Kernel, ...]:
 def _in_all_digits(p: Polynomial) -> Expression:
     """The sum of the terms of degree 0 and 2, rounded once."""
     content = 1 if () in p else magnitude(poly.content(p))
-    factors: list[Expression] = []
-    for monomial, x in sorted(p.items(), key=lambda term: len(term[0])):
-        if not monomial:
-            factors += [number(x), number(1)]
-            continue
-        a, b = (Name(text) for text in monomial)
-        size = ratio(magnitude(x), content)
-        first: Expression = a if size == 1 else Product(number(size), a)
-        factors += [first if x > 0 else negative(first), b]
-    total = Call("compensated_dot", tuple(factors))
+    total = Call("compensated_dot", factors_of(poly.scaled(p, ratio(1, content))))
     return total if content == 1 else Product(number(content), total)
 
 

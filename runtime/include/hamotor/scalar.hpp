@@ -647,6 +647,20 @@ template <class S>
   return {sum, (a - (sum - shadow)) + (b - shadow)};
 }
 
+/// a + b + … as if computed in twice the precision and rounded once (Ogita et al. 2005, Sum2).
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S compensated_sum(const S& a, const Rest&... rest) noexcept {
+  S sum = a;
+  S low(0);
+  const auto add = [&](const S& x) {
+    const auto total = two_sum(sum, x);
+    sum = total.hi;
+    low = low + total.lo;
+  };
+  (add(rest), ...);
+  return sum + low;
+}
+
 namespace detail {
 
 template <class S>
@@ -688,6 +702,18 @@ template <class S, class... Rest>
 [[nodiscard]] HAMOTOR_INLINE constexpr S compensated_dot(const S& a, const S& b,
                                                          const Rest&... rest) noexcept {
   return compensated_dot_pair(a, b, rest...).hi;
+}
+
+/// a₁ b₁ + a₂ b₂ + …: `compensated_dot` where `needed` > 0, `dot` elsewhere.  By a branch: where
+/// digits cancel is foreseen, and the compensated sum takes four times as long.
+template <class S, class... Rest>
+[[nodiscard]] HAMOTOR_INLINE constexpr S compensated_dot_where(const S& needed,
+                                                               const Rest&... rest) noexcept {
+  const auto where = needed > S(0);
+  const S plain = dot(rest...);
+  if (!any(where)) [[likely]]
+    return plain;
+  return select(where, compensated_dot(rest...), plain);
 }
 
 /// √x as √hi, known early, and what that leaves; 0 for 0.  The low part of x may be some ulp.
