@@ -15,6 +15,7 @@ from hamotor.mechanics.hamiltonian import coadjoint, inertial
 from hamotor.run.build import compile_scene
 from hamotor.run.library import SceneLibrary, Vector
 from hamotor.scene import GeneralScene, scene_source
+from hamotor.scene.methods import texts_of
 
 MOTION = """algebra = "pga3"
 [[body]]
@@ -109,6 +110,11 @@ def test_rows_cost_no_steps_and_lie_on_the_motion(
         run.advance(25, 0, None)
         assert np.abs(run.observe() - whole).max() < 1e-12
         assert run.steps() == taken < 300
+
+
+def test_a_library_of_all_methods_has_the_field() -> None:
+    assert texts_of(()) == texts_of(("rk87", "rkmk4")) == "rk54"
+    assert texts_of(("rkmk4",)) == texts_of((), in_coordinates=False) == ""
 
 
 def general(name: str) -> GeneralScene:

@@ -132,7 +132,7 @@ class Simulation:
                 raise UsageError("the matrix form has plain sums; leave compensated out.")
             source = self.matrix_source(scalar)
         else:
-            texts = texts_of(methods, in_coordinates=not ensembles)
+            texts = texts_of(methods, in_coordinates=bool(self.methods) and not ensembles)
             own_text: tuple[str, ...] = (texts,) if texts else ()
             if ensembles and self.ensemble.parameters:
                 own_text = (*(own_text or methods[:1] or ("",)), "drawn")

@@ -94,16 +94,17 @@ METHODS = (
 SERIES = "taylor"
 """Expands the motion, which is in the source of a scene for this method only."""
 IN_COORDINATES = ("rk54", "rk87")
-"""Step the motion in coordinates of the generator's choice, in sources that are for them only."""
+"""Step the motion in coordinates of the generator's choice, in sources that are for them or for all
+methods."""
 METHOD_NAMES = (AUTO, *(method.name for method in METHODS if method.forms & (ANY | Form.FREE)))
 """What a scene may ask for."""
 
 
 def texts_of(methods: Collection[str], *, in_coordinates: bool = True) -> str:
     """Of these methods those that stand for the texts of their own that a source needs, one space
-    apart."""
+    apart.  None stand for all but `SERIES`."""
     found = [SERIES] if SERIES in methods else []
-    if in_coordinates and set(methods) & set(IN_COORDINATES):
+    if in_coordinates and (not methods or set(methods) & set(IN_COORDINATES)):
         found.append(IN_COORDINATES[0])
     return " ".join(found)
 
