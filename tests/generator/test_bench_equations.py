@@ -85,6 +85,13 @@ def _implicit() -> GeneralScene:
     return replace(_general("kepler"), lagrangian=object())  # type: ignore[arg-type]
 
 
+def test_an_end_that_exploded_is_refused() -> None:
+    given = equations(_general("conformal_body"))
+    assert isinstance(given, Equations)
+    with pytest.raises(OverflowError):
+        given.state([1e200] * len(given.start))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["rocket", "conformal_top", "two_bodies@2", "free4"])
 def test_public_solvers_end_where_the_scene_does(name: str) -> None:

@@ -126,7 +126,13 @@ class Equations:
 
     def state(self, x: Sequence[float] | NDArray[np.float64]) -> list[float]:
         """Motors and momenta in the order of the scene's state; each motor divided by √⟨M M~⟩₀, as
-        a quaternion is by its length."""
+        a quaternion is by its length.  Raises OverflowError for what exploded."""
+        try:
+            return self._state(x)
+        except ValueError as beyond:  # ∞ − ∞, or a function of ∞
+            raise OverflowError(str(beyond)) from None
+
+    def _state(self, x: Sequence[float] | NDArray[np.float64]) -> list[float]:
         known = dict(zip(self.names, map(float, x), strict=True))
         for k, body in enumerate(self.bodies):
             square = _square(body, k, known)

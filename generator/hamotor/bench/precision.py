@@ -751,7 +751,10 @@ def _row(
         elif contestant.is_ours:
             found = endpoint.of_row(contestant.said["description"], said["final"])
         else:
-            found = one.end_of_peer(said["final"], observed_by)
+            try:
+                found = one.end_of_peer(said["final"], observed_by)
+            except OverflowError:
+                return replace(row, failure="its end is too large to read")
         errors = endpoint.errors(found, there)
     work = None
     if contestant.counted is not None:
