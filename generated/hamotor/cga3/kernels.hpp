@@ -2418,7 +2418,7 @@ template <class S>
 /// sqrt: Versor -> Versor
 /// √m: half the motion, √m √m = m.
 /// Not finite at M = −1, which is half a turn of the sheet from 1.
-/// Cost: 107 mul, 71 add (58 fused), 6 div, 2 abs, 10 compensated_dot_where, 7 select, 3 sqrt.
+/// Cost: 137 mul, 91 add (78 fused), 6 div, 2 abs, 7 select, 3 sqrt.
 template <class S>
 [[nodiscard]] constexpr Versor<S> sqrt(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2428,29 +2428,19 @@ template <class S>
                                (S(1) - m.s));
   const S omega =
       dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i, m.e012i, S(2), m.e0123 * m.e123i);
+  const S t_e1i = dot(-m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
+  const S t_e0i = dot(m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+  const S t_e01 = dot(-m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
+  const S t_e2i = dot(-m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
+  const S t_e02 = dot(-m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
+  const S t_e3i = dot(-m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
+  const S t_e03 = dot(-m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
+  const S t_e23 = dot(-m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
+  const S t_e13 = dot(m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
+  const S t_e12 = dot(-m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
   const S root_omega = scalar::sqrt(omega);
   const S isoclinic = mul_add(S(-0.25) * shifted, shifted, omega);
   const S share = select(isoclinic > S(0), select(shifted > S(0), S(-1), S(1)) / root_omega, S(0));
-  const S t_e1i =
-      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
-  const S t_e0i =
-      scalar::compensated_dot_where(isoclinic, m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
-  const S t_e01 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
-  const S t_e2i =
-      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
-  const S t_e02 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
-  const S t_e3i =
-      scalar::compensated_dot_where(isoclinic, -m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
-  const S t_e03 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
-  const S t_e23 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
-  const S t_e13 =
-      scalar::compensated_dot_where(isoclinic, m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
-  const S t_e12 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
   const S u_e23 = mul_add(share, t_e23, m.e23);
   const S u_e13 = mul_add(share, t_e13, -m.e31);
   const S u_e12 = mul_add(share, t_e12, m.e12);
@@ -2856,7 +2846,7 @@ template <class S>
 /// cayley_inverse: Versor -> Bivector
 /// (M − 1)(M + 1)⁻¹, M ~M = 1.
 /// Infinite at M = −1, which no finite bivector reaches.
-/// Cost: 90 mul, 67 add (56 fused), 4 div, 1 abs, 10 compensated_dot_where, 6 select, 1 sqrt.
+/// Cost: 101 mul, 74 add (61 fused), 4 div, 3 abs, 10 compensated_dot_where, 7 select, 1 sqrt.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> cayley_inverse(const Versor<S>& m) noexcept {
   const S shifted = select(m.s > S(0), S(1) + m.s,
@@ -2869,26 +2859,33 @@ template <class S>
   const S root_omega = scalar::sqrt(omega);
   const S isoclinic = mul_add(S(-0.25) * shifted, shifted, omega);
   const S share = select(isoclinic > S(0), select(shifted > S(0), S(-1), S(1)) / root_omega, S(0));
+  const S needed = select(isoclinic > S(0),
+                          mul_add(S(0.0625),
+                                  dot(S(2), scalar::abs(m.e0123 * m.e123i), m.e023i, m.e023i,
+                                      m.e031i, m.e031i, m.e012i, m.e012i),
+                                  -scalar::abs(dot(-m.e023i, m.e023i, -m.e031i, m.e031i, -m.e012i,
+                                                   m.e012i, S(2), m.e0123 * m.e123i))),
+                          S(0));
   const S t_e1i =
-      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
+      scalar::compensated_dot_where(needed, -m.e123i, m.e23, m.e012i, m.e2i, -m.e031i, m.e3i);
   const S t_e0i =
-      scalar::compensated_dot_where(isoclinic, m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
+      scalar::compensated_dot_where(needed, m.e023i, m.e23, m.e031i, m.e31, m.e012i, m.e12);
   const S t_e01 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
+      scalar::compensated_dot_where(needed, -m.e0123, m.e23, -m.e012i, m.e02, m.e03, m.e031i);
   const S t_e2i =
-      scalar::compensated_dot_where(isoclinic, -m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
+      scalar::compensated_dot_where(needed, -m.e123i, m.e31, -m.e012i, m.e1i, m.e023i, m.e3i);
   const S t_e02 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
+      scalar::compensated_dot_where(needed, -m.e0123, m.e31, m.e01, m.e012i, -m.e023i, m.e03);
   const S t_e3i =
-      scalar::compensated_dot_where(isoclinic, -m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
+      scalar::compensated_dot_where(needed, -m.e12, m.e123i, m.e031i, m.e1i, -m.e023i, m.e2i);
   const S t_e03 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
+      scalar::compensated_dot_where(needed, -m.e0123, m.e12, -m.e01, m.e031i, m.e02, m.e023i);
   const S t_e23 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
+      scalar::compensated_dot_where(needed, -m.e0123, m.e1i, m.e023i, m.e0i, -m.e01, m.e123i);
   const S t_e13 =
-      scalar::compensated_dot_where(isoclinic, m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
+      scalar::compensated_dot_where(needed, m.e0123, m.e2i, -m.e031i, m.e0i, m.e02, m.e123i);
   const S t_e12 =
-      scalar::compensated_dot_where(isoclinic, -m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
+      scalar::compensated_dot_where(needed, -m.e0123, m.e3i, m.e012i, m.e0i, -m.e03, m.e123i);
   const S u_e23 = mul_add(share, t_e23, m.e23);
   const S u_e13 = mul_add(share, t_e13, -m.e31);
   const S u_e12 = mul_add(share, t_e12, m.e12);

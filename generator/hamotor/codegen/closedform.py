@@ -94,6 +94,17 @@ def _with_all_digits(
         return square
     rough = _named(algebra, writer, "rough", quad)
     omega = poly.apply_bilinear(algebra.geometric, rough, rough).get(0, {})
+    cancels = writer.let("cancels", _cancels(omega))
+    return {0: square.get(0, {})} | {
+        b: _let_compensated(writer, f"w_{algebra.blade_name(b)}", p, cancels)
+        if len(p) > 1
+        else rough[b]
+        for b, p in quad.items()
+    }
+
+
+def _cancels(omega: Polynomial) -> Expression:
+    """Positive where a sum of products of names is much less than its terms."""
     omega = poly.scaled(omega, ratio(1, magnitude(poly.content(omega))))
     sizes: list[tuple[Expression, ...]] = []
     for (x, y), factor in omega.items():
@@ -103,14 +114,7 @@ def _with_all_digits(
         else:
             sizes.append((number(size), Call("abs", (Product(Name(x), Name(y)),))))
     left = Call("abs", (polynomial_expression(omega),))
-    needed = MultiplyAdd(number(CANCELLED), sum_of_products(sizes), negative(left))
-    cancels = writer.let("cancels", needed)
-    return {0: square.get(0, {})} | {
-        b: _let_compensated(writer, f"w_{algebra.blade_name(b)}", p, cancels)
-        if len(p) > 1
-        else rough[b]
-        for b, p in quad.items()
-    }
+    return MultiplyAdd(number(CANCELLED), sum_of_products(sizes), negative(left))
 
 
 def _let_compensated(writer: Writer, name: str, p: Polynomial, needed: Expression) -> Polynomial:
@@ -250,10 +254,11 @@ def _isoclinic(
     content: Expression,
     twisted: PolynomialMultivector,
     least: Rational = 0,
+    cancels: Expression | None = None,
 ) -> Isoclinic:
-    """twisted: <B W>₂ / content; its sums that have no name yet are compensated where they matter.
+    """least: √ω is small below half of it.
 
-    least: √ω is small below half of it.
+    twisted: <B W>₂ / content, over names; or its sums, which are compensated where `cancels` > 0.
     """
     root = writer.let("root_omega", Call("sqrt", (omega,)))
     size = writer.let("size", Call("max_abs", (s, number(least)))) if least else s
@@ -261,10 +266,12 @@ def _isoclinic(
     applies = writer.let("isoclinic", MultiplyAdd(quarter, size, omega))
     sign = Select(s, negative(content), content)
     share = writer.let("share", Select(applies, Quotient(sign, root), number(0)))
-    twisted = {
-        b: _let_compensated(writer, f"t_{algebra.blade_name(b)}", p, applies)
-        for b, p in twisted.items()
-    }
+    if cancels:
+        needed = writer.let("needed", Select(applies, cancels, number(0)))
+        twisted = {
+            b: _let_compensated(writer, f"t_{algebra.blade_name(b)}", p, needed)
+            for b, p in twisted.items()
+        }
     cancelled: PolynomialMultivector = {}
     for blade, p in bivector.items():
         part = MultiplyAdd(
@@ -656,7 +663,7 @@ def cayley_inverse_kernel(
             quad = {blade: dict.fromkeys((("slip",),), *p.values())}
             inverse = Name("inverse")
         elif omega:
-            norm = _norm_squared(algebra, writer, value, rest)
+            norm = _norm_squared(algebra, writer, value, rest, divided=True)
             inverse = writer.let("inverse", Quotient(ONE, norm))
             linear = writer.let("linear", Product(rest, inverse))
         else:
@@ -949,20 +956,28 @@ def _one_plus_scalar(algebra: Algebra, writer: Writer, value: PolynomialMultivec
 
 
 def _norm_squared(
-    algebra: Algebra, writer: Writer, value: PolynomialMultivector, n: Expression
+    algebra: Algebra,
+    writer: Writer,
+    value: PolynomialMultivector,
+    n: Expression,
+    divided: bool = False,
 ) -> Expression:
-    """N² − Q², where M ~M = 1, 1 + M = N + <M>₂ + Q; N is bound.
+    """N² − Q², where M ~M = 1, 1 + M = N + <M>₂ + Q; N is bound.  divided: without its root.
 
     Where one of c = s ± √Q² is near −1, N ± √Q² = 1 + c is (1 − c²) / (1 − c), 1 − c² from <M>₂.
     """
     quad = {b: p for b, p in value.items() if grade(b) == 4}
-    omega = polynomial_expression(poly.apply_bilinear(algebra.geometric, quad, quad)[0])
+    square = poly.apply_bilinear(algebra.geometric, quad, quad)[0]
+    omega = polynomial_expression(square)
     if not _may_be_isoclinic(algebra, quad):
         return MultiplyAdd(n, n, negative(omega))
     bivector = {b: p for b, p in value.items() if grade(b) == 2}
     omega = writer.let("omega", omega)
     twisted = _twisted(algebra, bivector, quad)
-    isoclinic = _isoclinic(algebra, writer, bivector, n, omega, ONE, twisted)
+    cancels = _cancels(square) if divided and _may_be_negative(algebra, quad) else None
+    if not cancels:
+        twisted = _named(algebra, writer, "t", twisted)
+    isoclinic = _isoclinic(algebra, writer, bivector, n, omega, ONE, twisted, cancels=cancels)
     side = writer.let("side", isoclinic.side)
     cosine = writer.let("cosine", Sum(polynomial_expression(value[0]), side))
     beyond = Quotient(negative(isoclinic.square), Sum(ONE, negative(cosine)))
