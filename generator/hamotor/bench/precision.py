@@ -184,18 +184,18 @@ def measure(
     parts: dict[str, Mapping[str, Any]] = {}
     for index, one in enumerate(problems):
         own = extents[one.name]
+        if one.name in kept:
+            parts[one.name] = kept[one.name]
+            continue
         try:
-            if one.name in kept:
-                parts[one.name] = kept[one.name]
-            else:
-                say(f"{one.name}: {index + 1} of {len(problems)} problems, {left}")
-                measured = _measured(one, own, peers)
-                if of := (alike or {}).get(one.name):
-                    measured["missing"][f"other kernels, scalars and such on {one.name}"] = (
-                        f"left out: its structure, algebra and group are those of {of}, which has"
-                        f" them; bench precision {one.name} measures them here"
-                    )
-                parts[one.name] = {"key": _key(one, own, about), **measured}
+            say(f"{one.name}: {index + 1} of {len(problems)} problems, {left}")
+            measured = _measured(one, own, peers)
+            if of := (alike or {}).get(one.name):
+                measured["missing"][f"other kernels, scalars and such on {one.name}"] = (
+                    f"left out: its structure, algebra and group are those of {of}, which has"
+                    f" them; bench precision {one.name} measures them here"
+                )
+            parts[one.name] = {"key": _key(one, own, about), **measured}
         except KeyboardInterrupt:
             done = ", ".join(parts) or "no problem yet"
             say(f"hamotor bench: kept: {done}; the same command goes on with {one.name}")
@@ -207,22 +207,29 @@ def measure(
             say(f"{one.name}: {refusal}")
             continue
         finally:
-            if one.name not in kept:
-                left.done()
+            left.done()
         file = _file_of(one, out)
         if out is None or file is None:
             continue
         out.mkdir(parents=True, exist_ok=True)
         write_whole(file, to_json(parts[one.name]))
         waiting = {
-            p.name: "not measured yet; the same command goes on" for p in problems[index + 1 :]
+            p.name: "not measured yet; the same command goes on"
+            for p in problems[index + 1 :]
+            if p.name not in kept
         }
-        account = _account(parts, {**missing, **waiting}, about)
+        # In the order asked for, those measured before among them.
+        known = {p.name: {**kept, **parts}[p.name] for p in problems if p.name in {*kept, *parts}}
+        account = _account(known, {**missing, **waiting}, about)
         for written in write_report(account, out, [one.name]):
             say(f"wrote {written}")
     if not parts:
         raise UsageError("hamotor bench: none of these scenes can be measured; see above")
-    return _account(parts, missing, about)
+    account = _account(parts, missing, about)
+    if out is not None and kept.keys() == parts.keys():
+        for written in write_report(account, out):
+            say(f"wrote {written}")
+    return account
 
 
 def _file_of(one: Problem, out: Path | None) -> Path | None:
