@@ -220,7 +220,7 @@ class Ensemble {
  private:
   /// Blocks that are stepped in turn: a step's operations wait for each other, those of an open
   /// step for twice as long as there are any.
-  static constexpr std::size_t in_turn = !is_pack<Scalar> ? 1 : stays_open<Method> ? 4 : 2;
+  static constexpr std::size_t in_turn = !is_pack<Scalar> ? 1 : stays_open<Method> ? 8 : 2;
   static constexpr std::size_t in_bundle = in_turn * lanes;
   /// Steps between looks whether all numbers are finite; a bundle in which one is not takes them
   /// again one by one.
