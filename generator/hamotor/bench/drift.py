@@ -74,9 +74,15 @@ class Conserved:
         return self._observe(self._problem.simulation.state)
 
     def rows(self, states: Sequence[Sequence[float]]) -> Rows:
-        """Rows of states in the coordinates that public solvers have: as the scene itself sees
-        them."""
-        return np.array([self._observe(self._state(x)) for x in states])
+        """Rows of states in the coordinates that public solvers have, as the scene itself sees
+        them, up to the first that exploded."""
+        found = []
+        for x in states:
+            try:
+                found.append(self._observe(self._state(x)))
+            except OverflowError:
+                break
+        return np.array(found)
 
     def exact(self, interval: Fraction, samples: int) -> Rows | None:
         """Rows at multiples of `interval`, or None where the motion has no closed form."""
