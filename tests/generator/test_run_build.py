@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import re
 import shutil
 import subprocess
@@ -13,8 +14,9 @@ from typing import Any
 import pytest
 
 from hamotor.errors import ToolError, UsageError
-from hamotor.run import build
+from hamotor.run import build, simulation
 from hamotor.run.build import compile_scene, find_compiler, headers_digest
+from hamotor.run.simulation import load
 
 SMALL = 'extern "C" __attribute__((visibility("default"))) int answer() { return 42; }\n'
 
@@ -170,6 +172,25 @@ def test_the_flags_keep_the_bits_of_the_kernels() -> None:
     assert "-march=native" in build.flags_for("x86_64")
     assert "-mcpu=native" in build.flags_for("aarch64")
     assert not any("fast-math" in flag for flag in build.flags_for("x86_64"))
+
+
+@pytest.mark.parametrize(("machine", "expected"), [("x86_64", 1), ("aarch64", 0)])
+def test_only_series_fill_the_widest_registers(
+    monkeypatch: pytest.MonkeyPatch, machine: str, expected: int
+) -> None:
+    narrow = ("-mprefer-vector-width=256",) * expected
+    given: list[tuple[str, ...]] = []
+
+    def compiled(_: str, *, extra_flags: tuple[str, ...], **__: Any) -> None:
+        given.append(extra_flags)
+        raise ToolError("not now")
+
+    monkeypatch.setattr(platform, "machine", lambda: machine)
+    monkeypatch.setattr(simulation, "compile_scene", compiled)
+    for methods in ("rk4", ("rk4", "taylor"), "taylor", None):
+        with pytest.raises(ToolError, match="not now"):
+            load("kepler").compile(method=methods, extra_flags=("-O1",))
+    assert given == [(*narrow, "-O1"), *[("-O1",)] * 3]
 
 
 def test_an_instruction_set_can_be_forced(monkeypatch: pytest.MonkeyPatch) -> None:

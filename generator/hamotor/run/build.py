@@ -140,6 +140,16 @@ def flags_for(machine: str) -> tuple[str, ...]:
     )
 
 
+def flags_without_packs(machine: str) -> tuple[str, ...]:
+    """Registers of 32 bytes, for methods that fill none of 64 themselves.
+
+    g++ 12 packs eight numbers that are about to be stored, a motor's, into one of 64, and what
+    reads them next waits for all.  Steps of `rk4` take 0.65 to 0.98 times as long without that,
+    those of the Taylor series, which fills such registers, 1.2 times.  The same bits.
+    """
+    return ("-mprefer-vector-width=256",) if machine in {"x86_64", "AMD64"} else ()
+
+
 @dataclass(frozen=True)
 class Requirement:
     """A library that a scalar is made of: what to link, a text that shows it is there, advice."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import platform
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -15,7 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hamotor.errors import UsageError, suggest
-from hamotor.run.build import CompiledScene, compile_scene, default_cache, eigen
+from hamotor.run.build import (
+    CompiledScene,
+    compile_scene,
+    default_cache,
+    eigen,
+    flags_without_packs,
+)
 from hamotor.run.choice import choose_method
 from hamotor.run.dataset import DiskRecorder, MemoryRecorder, RunFolder
 from hamotor.run.library import Description, SceneLibrary, Vector, check_method
@@ -147,12 +154,14 @@ class Simulation:
         if ensembles:
             source = f"#define HAMOTOR_ENSEMBLE\n#define HAMOTOR_FUSED\n{source}"
         generate_s = time.perf_counter() - started
+        fills_packs = not methods or "taylor" in methods
+        own_flags = () if fills_packs else flags_without_packs(platform.machine())
         shown = NoProgress() if progress is None else progress
         build = compile_scene(
             source,
             libraries=(eigen(),) if representation == "matrix" else (),
             scalar=scalar,
-            extra_flags=extra_flags,
+            extra_flags=(*own_flags, *extra_flags),
             on_compile=lambda: shown.note(f"compiling {self.name} …"),
         )
         return Compiled(build, SceneLibrary(build.library), generate_s, source)
