@@ -143,13 +143,13 @@ def beyond_doubles(account: Mapping[str, Any]) -> str:
     for name, word in SHOWN.items():
         ways = [
             f"{found['target']:.0e} in {brief(found['ours']['us'] / 1000, 2)} ms "
-            f"({found['ours']['name'].partition(' ')[0]})"
+            f"({found['ours']['name'].partition(',')[0].replace(' (', ' in ')})"
             for found in account["more_digits"]
             if found["problem"] == name
         ]
         if ways:
             said.append(f"{word} {' and '.join(dict.fromkeys([ways[0], ways[-1]]))}")
-    return f"Beyond a double, in quad: {'; '.join(said)}." if said else ""
+    return f"Beyond a double: {'; '.join(said)}." if said else ""
 
 
 def text(account: Mapping[str, Any]) -> str:
