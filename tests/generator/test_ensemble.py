@@ -5,9 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import signal
 import sys
-import threading
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, toy, toy_state
+from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, interrupts, toy, toy_state
 
 import hamotor
 from hamotor.errors import ToolError, UsageError
@@ -318,11 +316,10 @@ def test_states_of_ones_own_are_where_members_start() -> None:
 def test_an_interrupted_ensemble_keeps_what_was_computed(tmp_path: Path) -> None:
     toys = ensemble_of_toys({"SLEEP_US": 2000}, end=100.0, every=1)
     toys.compile(ensembles=True)
-    timer = threading.Timer(0.7, lambda: os.kill(os.getpid(), signal.SIGINT))
-    timer.start()
+    interrupting = interrupts(0.6)
     with pytest.raises(EnsembleInterrupted) as caught:
         run_ensemble(toys, 3, out=tmp_path / "run", threads=1)
-    timer.join()
+    interrupting.join()
     run = caught.value.run
     assert run.status == "interrupted"
     found = hamotor.open_ensemble(tmp_path / "run")

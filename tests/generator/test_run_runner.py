@@ -5,14 +5,13 @@ from __future__ import annotations
 import io
 import itertools
 import math
-import os
 import signal
 import threading
 import time
 
 import numpy as np
 import pytest
-from tests.generator.toy import RATE, toy, toy_state
+from tests.generator.toy import RATE, interrupts, toy, toy_state
 
 from hamotor.errors import NumericsError, UsageError
 from hamotor.run import runner, tolerance
@@ -157,13 +156,12 @@ def test_an_infinite_initial_state_is_refused_before_the_first_step() -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_the_run_and_keeps_what_was_computed(number: int) -> None:
-    timer = threading.Timer(0.4, os.kill, (os.getpid(), number))
     simulation = toy({"SLEEP_US": 1000})
     simulation.compile()
-    timer.start()
+    interrupting = interrupts(0.3, number)
     with pytest.raises(RunInterrupted) as caught:
         simulation.run(end=1000.0, step=0.01)
-    timer.join()
+    interrupting.join()
     run = caught.value.run
     assert run.status == "interrupted"
     assert 0 < run.report["steps"] < run.report["planned_steps"]
@@ -244,11 +242,10 @@ def test_a_ladder_that_would_take_too_long_keeps_its_last_whole_run() -> None:
 def test_an_interrupted_ladder_keeps_the_last_whole_run() -> None:
     simulation = toy({"SLEEP_US": 100})
     simulation.compile()
-    timer = threading.Timer(1.0, os.kill, (os.getpid(), signal.SIGINT))
-    timer.start()
+    interrupting = interrupts(0.9)
     with pytest.raises(RunInterrupted) as caught:
         simulation.run(tolerance=1e-15)
-    timer.join()
+    interrupting.join()
     run = caught.value.run
     assert run.status == "interrupted"
     assert run.report["tolerance"]["ladder"][-1]["status"] == "interrupted"

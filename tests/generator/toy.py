@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -56,3 +60,19 @@ def ensemble_of_toys(
     body = BodyDraws(motor=0, momentum=8, momenta=((RATE_AT, rate), (PUSH_AT, push)))
     draws = Ensemble(seed=3, bodies=(body,), quantiles=(0.25, 0.5))
     return toy(switches, ensemble=draws, **{"end": 0.5, "step": 0.05, "every": 5, **changes})
+
+
+def interrupts(after: float, number: int = signal.SIGINT) -> threading.Thread:
+    """Sends this process a signal so many seconds after a run has begun to heed it; before, it
+    would end the tests."""
+    unheeded = signal.getsignal(number)
+
+    def interrupt() -> None:
+        while signal.getsignal(number) == unheeded:
+            time.sleep(0.01)
+        time.sleep(after)
+        os.kill(os.getpid(), number)
+
+    thread = threading.Thread(target=interrupt, daemon=True)
+    thread.start()
+    return thread
