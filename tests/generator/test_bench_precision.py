@@ -21,7 +21,7 @@ from tests.bench.precision import peers, stopwatch
 from hamotor.bench import endpoint, precision, problems, readme, solvers
 from hamotor.bench.account import Progress
 from hamotor.bench.contest import Contestant, Extent, Form, Row
-from hamotor.bench.drift import _growth
+from hamotor.bench.drift import Conserved, _growth
 from hamotor.bench.endpoint import ATTITUDE, ENERGY, POSITION
 from hamotor.bench.precision import measure
 from hamotor.bench.precision_report import best, coverage, draw, more_digits, over_problems, table
@@ -184,6 +184,16 @@ def test_a_methods_settings_are_timed_and_reported_from_coarse_to_fine(
     assert both["not_there"]["other"] == "no reference"
     with pytest.raises(UsageError, match="no reference"):
         measure([one], replace(extent, rounds=3), {}, {}, tmp_path)
+
+
+@pytest.mark.slow
+def test_a_long_run_of_rotations_alone_is_one_of_the_whole_body() -> None:
+    one = problem("tumble")
+    library = one.simulation.compile(method="splitting2").library
+    assert not isinstance(one.for_peers, str)
+    of = Conserved(one, library, "splitting2")
+    (row,) = of.rows([one.for_peers["state"]])
+    assert row == pytest.approx(of.start(), abs=1e-15)
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from hamotor.bench.problems import Problem
 from hamotor.run.attitude import angle_between, rotation_matrices
 from hamotor.run.library import Description, SceneLibrary
 from hamotor.run.simulation import Simulation
-from hamotor.scene.motors import motor_of, rotor_of_quaternion
+from hamotor.scene.motors import motor_of, rotation_matrix, rotor_of_quaternion
 
 SAMPLES: Final = 1000
 _POINTS: Final = 24
@@ -111,8 +111,11 @@ class Conserved:
         rotor = rotor_of_quaternion(x[:4])
         kinetic = np.array(body.kinetic_matrix)[:3, :3]
         momentum = [float(p) for p in kinetic @ np.array(x[4:7])]
-        if len(x) == 7:
+        if len(x) == 7 and not body.group.translates:
             return [*map(float, rotor), *momentum]
+        if len(x) == 7:  # turned alone: it stays, and moves on, as it started
+            velocity = rotation_matrix(body.rotor) @ np.array(body.momentum[3:]) / body.mass
+            x = [*x, *body.position, *velocity]
         motor = dict(
             zip(
                 ("s", "e23", "e31", "e12", "e01", "e02", "e03", "e0123"),
