@@ -244,7 +244,7 @@ def default_problems() -> list[str]:
     return own + [f"{name}@{_ENDS[name]:g}" if name in _ENDS else name for name in scenes]
 
 
-_ENDS: Final = {"two_bodies": 2.0, "spring_pendulum": 10.0, "conformal_pendulum": 10.0}
+_ENDS: Final = {"two_bodies": 2.0, "spring_pendulum": 5.0, "conformal_pendulum": 5.0}
 
 
 def _from_digits(file: Path, one: Problem) -> Reference:
