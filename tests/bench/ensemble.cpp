@@ -107,6 +107,19 @@ struct Cost {
   double flops;
   double slots;
 };
+/// Whether an ensemble's steps are made of turns about tiny angles.
+template <class Problem, template <class> class Method>
+bool has_tiny_turns() {
+  const auto system = Problem::template system<double>();
+  using System = std::remove_cvref_t<decltype(system)>;
+  if constexpr (hamotor::stays_open<Method<System>>) {
+    return Method<System>::range_of_turns(system, member<System>(0), step) ==
+           hamotor::AngleRange::tiny;
+  } else {
+    return false;
+  }
+}
+
 template <class Problem, template <class> class Method>
 Cost cost() {
   using S = hamotor::Counted;
@@ -129,11 +142,17 @@ Cost cost() {
       return 0;
     }
   }();
+  [[maybe_unused]] const bool tiny = has_tiny_turns<Problem, Method>();
   const auto take = [&](int many) {
+    using hamotor::AngleRange;
     for (int k = 0; k < many; ++k) {
       if constexpr (hamotor::stays_open<Method<System>>) {
         for (std::size_t turn = 0; turn < Method<System>::turns; ++turn) {
-          method.template do_turn<true>(system, state, S::fixed(step), turn);
+          if (tiny) {
+            method.template do_turn<AngleRange::tiny>(system, state, S::fixed(step), turn);
+          } else {
+            method.template do_turn<AngleRange::small>(system, state, S::fixed(step), turn);
+          }
         }
       } else if constexpr (hamotor::carries_state<Method<System>>) {
         method.do_open_step(plan);

@@ -282,6 +282,30 @@ def test_who_may_not_install_is_told_the_line(ready: Clone, sudo: str | None) ->
     assert line == "sudo apt-get update && sudo apt-get install -y g++"
 
 
+def bench_needs(clone: Clone) -> list[str]:
+    """What `bench` needs and this machine lacks: headers are looked for where they always are."""
+    for name in FOR_TESTS[:3]:
+        clone.add_tool(name)
+    answer = clone.call("bench", HAMOTOR_NO_APT="1")
+    return answer.stderr.splitlines()[-1].split("install -y ")[1:] if answer.returncode else []
+
+
+def test_peers_of_benchmarks_come_along_where_they_may_be_installed(ready: Clone) -> None:
+    needed = bench_needs(ready)
+    log = ready.root / "apt.log"
+    ready.add_tool("id", "echo 0")
+    ready.add_tool("apt-get", f'echo "$@" >>"{log}"; exit 100')
+    answer = ready.call("bench", "precision", "--with-peers")
+    assert "clang" in log.read_text().splitlines()[-1].split()
+    assert answer.returncode == (4 if needed else 0)
+    assert needed or "could not install them, and goes without" in answer.stderr
+    log.unlink()
+    ready.call("bench", "precision", "--with-peers", HAMOTOR_NO_APT="1")
+    assert not log.exists()
+    if not needed:
+        assert ready.call("bench").stderr == ""
+
+
 def test_system_packages_without_a_network_are_a_clear_error(ready: Clone) -> None:
     ready.add_tool("id", "echo 0")
     ready.add_tool("apt-get", "echo 'E: Failed to fetch g++: Could not resolve the host'; exit 100")

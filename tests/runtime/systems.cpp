@@ -213,6 +213,32 @@ TEST(AngleIncrement, has_all_digits_of_any_angle) {
   EXPECT_TRUE(std::isnan(AngleIncrement<double>::of(std::nan("")).sine));
 }
 
+template <class S>
+void expect_tiny_angles_as_small_ones() {
+  using Increment = hamotor::AngleIncrement<S>;
+  using hamotor::AngleRange;
+  const auto expect_same = [](S x) {
+    const auto tiny = Increment::template of_small<AngleRange::tiny>(x);
+    const auto small = Increment::of_small(x);
+    ASSERT_EQ(tiny.sine, small.sine) << x;
+    ASSERT_EQ(tiny.cosine_less_one, small.cosine_less_one) << x;
+  };
+  const S last = S(1) / S(16);
+  S next_to_last = last;
+  for (int k = 0; k < 200000; ++k) {
+    expect_same(next_to_last = std::nextafter(next_to_last, S(0)));
+    expect_same(last * static_cast<S>(k) / S(200000));
+  }
+  for (int k = 0; k < 1200; ++k) expect_same(std::ldexp(S(-1.3), -5 - k));
+  expect_same(last);
+  expect_same(0);
+}
+
+TEST(AngleIncrement, of_tiny_angles_has_the_bits_of_small_ones) {
+  expect_tiny_angles_as_small_ones<double>();
+  expect_tiny_angles_as_small_ones<float>();
+}
+
 TEST(RotationSplit, a_symmetry_saves_rotations) {
   EXPECT_EQ(hamotor::rotation_split(std::array<double, 3>{2, 2, 1}), (RotationSplit{0, 2, 1, 1}));
   EXPECT_EQ(hamotor::rotation_split(std::array<double, 3>{1, 2, 2}), (RotationSplit{1, 0, 2, 1}));

@@ -7,24 +7,33 @@
 
 namespace hamotor {
 
+/// How large angles are known to be: at most 1/16, at most π/4, or nothing is known.
+enum class AngleRange { tiny, small, any };
+
 namespace detail {
 
 /// (sin x)/x − 1 over z, and (cos x − 1)/z, z = x² ≤ (π/4)²: minimax polynomials, relative errors
 /// of sin x and cos x − 1 below 2.1e-17 before rounding.  Sums in pairs, so that few wait for each
 /// other.
-template <class S>
+///
+/// Of tiny angles, z ≤ 2⁻⁸, the third pair is z⁴/11! < 2⁻⁵⁷ beside 1/3!, and z⁴/12! < 2⁻⁶⁰ beside
+/// 1/4!: less than half of what their last digits stand for, so that the sum is the same without
+/// it, to the bit.
+template <AngleRange range = AngleRange::small, class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S sine_series(const S& z) noexcept {
   const S z2 = z * z;
   const S a = mul_add(S(0x1.1111111110babp-7), z, S(-0x1.5555555555555p-3));
   const S b = mul_add(S(0x1.71de37946ed6dp-19), z, S(-0x1.a01a019e820aep-13));
+  if constexpr (range == AngleRange::tiny) return mul_add(z2, b, a);
   const S c = mul_add(S(0x1.5e0a4fc16be59p-33), z, S(-0x1.ae6008d114485p-26));
   return mul_add(z2 * z2, c, mul_add(z2, b, a));
 }
-template <class S>
+template <AngleRange range = AngleRange::small, class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S cosine_series(const S& z) noexcept {
   const S z2 = z * z;
   const S a = mul_add(S(-0x1.6c16c16c16963p-10), z, S(0x1.5555555555555p-5));
   const S b = mul_add(S(-0x1.27e4fa16cc2d1p-22), z, S(0x1.a01a019f4ddfdp-16));
+  if constexpr (range == AngleRange::tiny) return mul_add(z, mul_add(z2, b, a), S(-0.5));
   const S c = mul_add(S(-0x1.907cd8ff5ede7p-37), z, S(0x1.1eeb67d026ec6p-29));
   return mul_add(z, mul_add(z2 * z2, c, mul_add(z2, b, a)), S(-0.5));
 }
@@ -34,9 +43,9 @@ template <class S>
 inline constexpr bool has_series =
     std::same_as<scalar::NumberOf<S>, double> || std::same_as<scalar::NumberOf<S>, float>;
 
-/// (π/4)²
-template <class S>
-inline constexpr S series_bound = S(0x1.3bd3cc9be45dep-1);
+/// (π/4)², or 1/16².
+template <class S, AngleRange range = AngleRange::small>
+inline constexpr S series_bound = S(range == AngleRange::tiny ? 0x1p-8 : 0x1.3bd3cc9be45dep-1);
 
 /// An angle of less than 1e8 as quarter turns and a rest of at most π/4 (Cody & Waite 1980), π/2 in
 /// three words, where multiply-adds are fused.
@@ -97,9 +106,12 @@ struct AngleIncrement {
     return angle * angle <= detail::series_bound<S>;
   }
 
+  template <AngleRange range = AngleRange::small>
+    requires(range != AngleRange::any)
   [[nodiscard]] HAMOTOR_INLINE static constexpr AngleIncrement of_small(const S& angle) noexcept {
     const S z = angle * angle;
-    return {mul_add(angle * z, detail::sine_series(z), angle), z * detail::cosine_series(z)};
+    return {mul_add(angle * z, detail::sine_series<range>(z), angle),
+            z * detail::cosine_series<range>(z)};
   }
 
   /// Of twice the angle.

@@ -19,6 +19,7 @@
 #include <utility>
 #include <vector>
 
+#include "hamotor/angle_increment.hpp"
 #include "hamotor/pack.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/state.hpp"
@@ -282,16 +283,22 @@ class Ensemble {
       const std::array<System, in_turn> systems{systems_(bundle * in_turn + g)...};
       const Scalar h(step_);
       if constexpr (stays_open<Method>) {
-        const auto take = [&]<bool is_small>(std::bool_constant<is_small>) {
+        const auto take = [&]<AngleRange range> {
           for (std::int64_t k = 0; k < steps; ++k) {
             for (std::size_t turn = 0; turn < Method::turns; ++turn) {
-              (blocks[g].method.template do_turn<is_small>(systems[g], blocks[g].state, h, turn),
-               ...);
+              (blocks[g].method.template do_turn<range>(systems[g], blocks[g].state, h, turn), ...);
             }
           }
         };
-        const bool small = (Method::turns_stay_small(systems[g], blocks[g].state, h) && ...);
-        small ? take(std::true_type{}) : take(std::false_type{});
+        // The same bits whichever it is: only what cannot count is left out.
+        switch (std::max({Method::range_of_turns(systems[g], blocks[g].state, h)...})) {
+          case AngleRange::tiny:
+            return take.template operator()<AngleRange::tiny>();
+          case AngleRange::small:
+            return take.template operator()<AngleRange::small>();
+          case AngleRange::any:
+            return take.template operator()<AngleRange::any>();
+        }
       } else if constexpr (requires { typename Method::Plan; }) {
         const std::array<typename Method::Plan, in_turn> plans{
             typename Method::Plan(systems[g], h)...};

@@ -320,31 +320,33 @@ class PrincipalRotation {
     return change;
   }
 
-  /// Half the turn about o, or about i, in the time h; `is_small` where it is known to be.
-  template <bool is_outer, bool is_small>
+  /// Half the turn about o, or about i, in the time h, of an angle in the range.
+  template <bool is_outer, AngleRange range>
   [[nodiscard]] HAMOTOR_INLINE constexpr AngleIncrement<S> half_turn(const Angular& pi,
                                                                      const S& h) const noexcept
     requires(R == 3)
   {
     const S x = S(0.5) * h * (is_outer ? outer_ : inner_) * pi[is_outer ? outer : inner];
-    if constexpr (is_small) {
-      return AngleIncrement<S>::of_small(x);
-    } else {
+    if constexpr (range == AngleRange::any) {
       return AngleIncrement<S>::of(x);
+    } else {
+      return AngleIncrement<S>::template of_small<range>(x);
     }
   }
 
-  /// Whether every half turn in the time h is small and remains so: |Π| is constant but for
+  /// The range in which every half turn in the time h is and remains: |Π| is constant but for
   /// rounding, for which there is room.
-  [[nodiscard]] constexpr bool turns_stay_small(const Angular& pi, const S& h) const noexcept
+  [[nodiscard]] constexpr AngleRange range_of_turns(const Angular& pi, const S& h) const noexcept
     requires(R == 3)
   {
     if constexpr (detail::has_series<S>) {
       const S rate = S(0.5) * h * scalar::max_abs(outer_, inner_);
-      return all(rate * rate * detail::dot(pi, pi) <= S(0.99) * detail::series_bound<S>);
-    } else {
-      return false;
+      const S largest = rate * rate * detail::dot(pi, pi);
+      const S room(0.99);
+      if (all(largest <= room * detail::series_bound<S, AngleRange::tiny>)) return AngleRange::tiny;
+      if (all(largest <= room * detail::series_bound<S>)) return AngleRange::small;
     }
+    return AngleRange::any;
   }
 
   /// q − 1 for the motion of a ball of moments J_c: the rotation about Π itself, which leaves Π as

@@ -57,7 +57,7 @@ class Pack {
   static constexpr std::size_t lanes = W;
 
   Pack() = default;
-  constexpr Pack(const Pack&) = default;
+  HAMOTOR_INLINE constexpr Pack(const Pack& x) noexcept : v_(x.v_) {}
   /// The same number in every lane.
   template <class Number_>
     requires std::is_arithmetic_v<Number_>
@@ -65,7 +65,10 @@ class Pack {
   HAMOTOR_INLINE constexpr explicit Pack(const Vector& v) noexcept
     requires(W > 1)
       : v_(v) {}
-  constexpr Pack& operator=(const Pack&) = default;
+  HAMOTOR_INLINE constexpr Pack& operator=(const Pack& x) noexcept {
+    v_ = x.v_;
+    return *this;
+  }
 
   [[nodiscard]] HAMOTOR_INLINE constexpr const Vector& vector() const noexcept { return v_; }
 

@@ -926,25 +926,25 @@ class Splitting {
   constexpr void open(const System& system, StateOf<System>& state, const S& h) const noexcept
     requires(stays_open)
   {
-    system.template turn<true, false>(state.motors, state.momenta, weights.kicks[0] * h);
+    system.template turn<true, AngleRange::any>(state.motors, state.momenta, weights.kicks[0] * h);
   }
 
-  /// Whether all turns of steps of h are small, from this state on: |Π| is constant but for
-  /// rounding, for which there is room.
-  [[nodiscard]] static constexpr bool turns_stay_small(const System& system,
-                                                       const StateOf<System>& state,
-                                                       const S& h) noexcept
+  /// The range of half the angles of all turns of steps of h, from this state on: |Π| is constant
+  /// but for rounding, for which there is room.
+  [[nodiscard]] static constexpr AngleRange range_of_turns(const System& system,
+                                                           const StateOf<System>& state,
+                                                           const S& h) noexcept
     requires(stays_open)
   {
     S largest = weights.kicks[stages] + weights.kicks[0];
     for (const S& weight : weights.drifts) largest = scalar::max_abs(largest, weight);
     for (const S& weight : weights.kicks) largest = scalar::max_abs(largest, weight);
-    return system.turns_stay_small(state.momenta, largest * h);
+    return system.range_of_turns(state.momenta, largest * h);
   }
 
   /// Takes an open state through one of the `turns` of a step of h, which are taken in this order.
   /// They leave the group by rounding only, so that motors are put back every 16 steps.
-  template <bool is_small>
+  template <AngleRange range>
   [[gnu::flatten]] HAMOTOR_INLINE constexpr void do_turn(const System& system,
                                                          StateOf<System>& state, const S& h,
                                                          std::size_t number) noexcept
@@ -952,12 +952,12 @@ class Splitting {
   {
     const std::size_t stage = stages == 1 ? 0 : number / 2;  // a constant, where it is one
     if (number % 2 == 0) {
-      system.template turn<false, is_small>(state.motors, state.momenta, weights.drifts[stage] * h);
+      system.template turn<false, range>(state.motors, state.momenta, weights.drifts[stage] * h);
       return;
     }
     const bool last = stage + 1 == stages;
     const S weight = last ? weights.kicks[stages] + weights.kicks[0] : weights.kicks[stage + 1];
-    system.template turn<true, is_small>(state.motors, state.momenta, weight * h);
+    system.template turn<true, range>(state.motors, state.momenta, weight * h);
     if (!last) return;
     open_steps_ = (open_steps_ + 1) % 16;
     if (open_steps_ == 0) put_back(state);
@@ -968,7 +968,7 @@ class Splitting {
                                                  const S& h, const S& steps) const noexcept
     requires(stays_open)
   {
-    system.template turn<true, false>(state.motors, state.momenta, -weights.kicks[0] * h);
+    system.template turn<true, AngleRange::any>(state.motors, state.momenta, -weights.kicks[0] * h);
     const auto change = system.commuting_change(state.motors, state.momenta, steps * h);
     for (std::size_t i = 0; i < n; ++i) {
       state.motors[i] = state.motors[i] + change.motors[i];

@@ -7,6 +7,7 @@
 // types: what a scene does not need is not compiled.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <tuple>
@@ -225,22 +226,21 @@ class PrincipalBody {
     return moved(m, mu, h, rotation_.free_step(angular(mu), h, weights));
   }
 
-  /// A part of the free motion: the turn about the axis o, or about i, in the time h; `is_small`
-  /// where it is known to be.
-  template <bool is_outer, bool is_small>
+  /// A part of the free motion: the turn about the axis o, or about i, in the time h, of
+  /// half an angle in the range.
+  template <bool is_outer, AngleRange range>
   HAMOTOR_INLINE constexpr void turn(Element& m, Momentum& mu, const S& h) const noexcept
     requires(has_two_turns)
   {
     constexpr auto axis = static_cast<std::size_t>(is_outer ? split.outer : split.inner);
-    detail::turn_body<axis>(m, mu,
-                            rotation_.template half_turn<is_outer, is_small>(angular(mu), h));
+    detail::turn_body<axis>(m, mu, rotation_.template half_turn<is_outer, range>(angular(mu), h));
   }
 
-  /// Whether those turns are small and remain so.
-  [[nodiscard]] constexpr bool turns_stay_small(const Momentum& mu, const S& h) const noexcept
+  /// The range in which half of those turns' angles are and remain.
+  [[nodiscard]] constexpr AngleRange range_of_turns(const Momentum& mu, const S& h) const noexcept
     requires(has_two_turns)
   {
-    return rotation_.turns_stay_small(angular(mu), h);
+    return rotation_.range_of_turns(angular(mu), h);
   }
 
   /// What else the free motion adds in the time h: it commutes with those turns, and is exact.
@@ -1016,23 +1016,24 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   }
 
   /// The turn of every body about its axis o, or i, in the time h.
-  template <bool is_outer, bool is_small>
+  template <bool is_outer, AngleRange range>
   HAMOTOR_INLINE constexpr void turn(Motors& motors, Momenta& momenta,
                                      const Scalar& h) const noexcept
     requires(has_two_turns)
   {
-    turn_each<is_outer, is_small>(motors, momenta, h, std::make_index_sequence<bodies>{});
+    turn_each<is_outer, range>(motors, momenta, h, std::make_index_sequence<bodies>{});
   }
 
-  /// Whether all those turns are small and remain so.
-  [[nodiscard]] constexpr bool turns_stay_small(const Momenta& momenta,
-                                                const Scalar& h) const noexcept
+  /// The range in which half of all those turns' angles are and remain.
+  [[nodiscard]] constexpr AngleRange range_of_turns(const Momenta& momenta,
+                                                    const Scalar& h) const noexcept
     requires(has_two_turns)
   {
-    bool small = true;
-    for_each_body(
-        [&](auto i, const auto& one) { small = small && one.turns_stay_small(momenta[i], h); });
-    return small;
+    AngleRange range = AngleRange::tiny;
+    for_each_body([&](auto i, const auto& one) {
+      range = std::max(range, one.range_of_turns(momenta[i], h));
+    });
+    return range;
   }
 
   /// What all that commutes with those turns adds in the time h.
@@ -1074,10 +1075,10 @@ class RigidBodies<std::tuple<Body...>, std::tuple<Interaction...>> {
   }
 
   /// A function, as g++ sometimes leaves a lambda as a call, for which a state goes through memory.
-  template <bool is_outer, bool is_small, std::size_t... i>
+  template <bool is_outer, AngleRange range, std::size_t... i>
   HAMOTOR_INLINE constexpr void turn_each(Motors& motors, Momenta& momenta, const Scalar& h,
                                           std::index_sequence<i...>) const noexcept {
-    (std::get<i>(bodies_).template turn<is_outer, is_small>(motors[i], momenta[i], h), ...);
+    (std::get<i>(bodies_).template turn<is_outer, range>(motors[i], momenta[i], h), ...);
   }
 
   template <class Weights>
