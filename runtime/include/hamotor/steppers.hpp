@@ -11,6 +11,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "hamotor/angle_increment.hpp"
 #include "hamotor/compensated.hpp"
 #include "hamotor/scalar.hpp"
 #include "hamotor/space.hpp"
