@@ -49,13 +49,6 @@ HAMOTOR_INLINE constexpr void put_together(const std::array<S, n>& from,
 }
 
 #ifdef HAMOTOR_PACKS
-template <class S>
-[[nodiscard]] HAMOTOR_INLINE inline HalfLanes<S> half_pack(const S* from) noexcept {
-  HalfLanes<S> x;
-  __builtin_memcpy(&x, from, sizeof x);
-  return x;
-}
-
 template <auto present, std::size_t count, class S, std::size_t n, std::size_t most>
   requires(has_packs<S> && n % 4 == 0)
 HAMOTOR_INLINE inline void move_by(const std::array<S, n>& x, const S& h, const S* c,
@@ -65,21 +58,20 @@ HAMOTOR_INLINE inline void move_by(const std::array<S, n>& x, const S& h, const 
   std::array<V, n / 4> sum{};
   const auto add = [&](const S& weight, std::size_t r, std::array<V, n / 4>& onto) {
     for (std::size_t i = 0; i < n / 4; ++i) {
-      onto[i] = packed_mul_add(V{weight, weight, weight, weight}, half_pack(y[r].data() + 4 * i),
-                               onto[i]);
+      onto[i] =
+          packed_mul_add(V{weight, weight, weight, weight}, at<4>(y[r].data() + 4 * i), onto[i]);
     }
   };
   each<count - 1>([&](auto r) {
     if constexpr (present[r]) add(c[r], r, sum);
   });
   for (std::size_t i = 0; i < n / 4; ++i) {
-    sum[i] = packed_mul_add(V{h, h, h, h}, sum[i], half_pack(x.data() + 4 * i));
+    sum[i] = packed_mul_add(V{h, h, h, h}, sum[i], at<4>(x.data() + 4 * i));
   }
   // Of the slope found last one operation waits.
   if constexpr (present[count - 1]) add(h * c[count - 1], count - 1, sum);
   for (std::size_t i = 0; i < n / 4; ++i) {
-    const V found = sum[i];
-    __builtin_memcpy(result.data() + 4 * i, &found, sizeof found);
+    at<4>(result.data() + 4 * i) = sum[i];
   }
 }
 
@@ -91,7 +83,7 @@ HAMOTOR_INLINE inline void put_together(const std::array<S, n>& from,
   each<n / 4>([&](auto i) {
     constexpr std::size_t k = 4 * i;
     const HalfLanes<S> x{from[k], from[k + 1], from[k + 2], from[k + 3]};
-    __builtin_memcpy(to.data() + k, &x, sizeof x);
+    at<4>(to.data() + k) = x;
   });
 }
 #endif

@@ -10,11 +10,11 @@
 
 #include "hamotor/scalar.hpp"
 
-#if defined(__GNUC__) && (defined(__AVX512F__) || defined(HAMOTOR_FUSED))
+#if defined(__GNUC__) && defined(__AVX2__) && defined(__FMA__)
 #define HAMOTOR_PACKS 1
-#endif
-#if defined(__AVX512F__) && defined(__GNUC__)
 #include <immintrin.h>
+#elif defined(__GNUC__) && defined(HAMOTOR_FUSED)
+#define HAMOTOR_PACKS 1
 #endif
 
 namespace hamotor {
@@ -102,9 +102,6 @@ struct Pack {
   using Lanes [[gnu::vector_size(8 * sizeof(S))]] = S;
 };
 
-template <class S>
-using Lanes = typename Pack<S>::Lanes;
-
 /// Half of it: where numbers are computed one by one in between, for which a processor that works
 /// on 512 bits has one unit less.
 template <class S>
@@ -115,22 +112,86 @@ struct HalfPack {
 template <class S>
 using HalfLanes = typename HalfPack<S>::Lanes;
 
-#ifdef __AVX512F__
-[[nodiscard]] HAMOTOR_INLINE inline Lanes<double> packed_mul_add(const Lanes<double>& a,
-                                                                 const Lanes<double>& b,
-                                                                 const Lanes<double>& c) noexcept {
-  return _mm512_fmadd_pd(a, b, c);
+/// W numbers in memory as a vector, wherever they begin.  Not by memcpy, of which g++ 12 makes
+/// moves of 16 bytes.
+template <class S, std::size_t W>
+struct InMemory {
+  using type [[gnu::vector_size(W * sizeof(S)), gnu::aligned(sizeof(S)), gnu::may_alias]] = S;
+};
+template <std::size_t W, class S>
+[[nodiscard]] HAMOTOR_INLINE inline auto& at(S* numbers) noexcept {
+  using Number = std::remove_const_t<S>;
+  using Vector = typename InMemory<Number, W>::type;
+  return *reinterpret_cast<std::conditional_t<std::is_const_v<S>, const Vector, Vector>*>(numbers);
 }
 
-[[nodiscard]] HAMOTOR_INLINE inline Lanes<float> packed_mul_add(const Lanes<float>& a,
-                                                                const Lanes<float>& b,
-                                                                const Lanes<float>& c) noexcept {
-  return _mm256_fmadd_ps(a, b, c);
-}
-
+#if defined(__AVX2__) && defined(__FMA__)
 [[nodiscard]] HAMOTOR_INLINE inline HalfLanes<double> packed_mul_add(
     const HalfLanes<double>& a, const HalfLanes<double>& b, const HalfLanes<double>& c) noexcept {
   return _mm256_fmadd_pd(a, b, c);
+}
+
+#ifdef __AVX512F__
+[[nodiscard]] HAMOTOR_INLINE inline Pack<double>::Lanes packed_mul_add(
+    const Pack<double>::Lanes& a, const Pack<double>::Lanes& b,
+    const Pack<double>::Lanes& c) noexcept {
+  return _mm512_fmadd_pd(a, b, c);
+}
+#else
+/// Eight doubles in two registers: a vector type that is wider than registers lives in memory.
+struct Halves {
+  using Half = HalfLanes<double>;
+  Half low;
+  Half high;
+
+  Halves() = default;
+  HAMOTOR_INLINE Halves(const Half& a, const Half& b) noexcept : low(a), high(b) {}
+  // Copied as two vectors: the copy of a whole object g++ 12 makes of smaller pieces, for which
+  // loads of vectors wait.
+  HAMOTOR_INLINE Halves(const Halves& x) noexcept : low(x.low), high(x.high) {}
+  HAMOTOR_INLINE Halves& operator=(const Halves& x) noexcept {
+    low = x.low;
+    high = x.high;
+    return *this;
+  }
+
+  HAMOTOR_INLINE friend Halves operator+(const Halves& a, const Halves& b) noexcept {
+    return {a.low + b.low, a.high + b.high};
+  }
+  HAMOTOR_INLINE friend Halves operator-(const Halves& a, const Halves& b) noexcept {
+    return {a.low - b.low, a.high - b.high};
+  }
+  HAMOTOR_INLINE friend Halves operator*(const Halves& a, const Halves& b) noexcept {
+    return {a.low * b.low, a.high * b.high};
+  }
+  HAMOTOR_INLINE friend Halves operator+(const Halves& a, double x) noexcept {
+    return {a.low + x, a.high + x};
+  }
+  HAMOTOR_INLINE friend Halves operator*(const Halves& a, double x) noexcept {
+    return {a.low * x, a.high * x};
+  }
+  HAMOTOR_INLINE Halves operator-() const noexcept { return {-low, -high}; }
+  HAMOTOR_INLINE Halves& operator+=(const Halves& x) noexcept { return *this = *this + x; }
+  HAMOTOR_INLINE double operator[](std::size_t lane) const noexcept {
+    return lane < 4 ? low[lane] : high[lane - 4];
+  }
+};
+
+template <>
+struct Pack<double> {
+  using Lanes = Halves;
+};
+
+[[nodiscard]] HAMOTOR_INLINE inline Halves packed_mul_add(const Halves& a, const Halves& b,
+                                                          const Halves& c) noexcept {
+  return {packed_mul_add(a.low, b.low, c.low), packed_mul_add(a.high, b.high, c.high)};
+}
+#endif
+
+[[nodiscard]] HAMOTOR_INLINE inline Pack<float>::Lanes packed_mul_add(
+    const Pack<float>::Lanes& a, const Pack<float>::Lanes& b,
+    const Pack<float>::Lanes& c) noexcept {
+  return _mm256_fmadd_ps(a, b, c);
 }
 
 [[nodiscard]] HAMOTOR_INLINE inline HalfLanes<float> packed_mul_add(
@@ -147,15 +208,89 @@ template <class V>
 #endif
 
 template <class S>
+using Lanes = typename Pack<S>::Lanes;
+
+/// Vectors that take a register each: the halves of eight doubles where registers hold four.
+template <class V, std::size_t n>
+[[nodiscard]] HAMOTOR_INLINE inline auto in_registers(const std::array<V, n>& x) noexcept {
+  if constexpr (requires { x[0].low; }) {
+    std::array<typename V::Half, 2 * n> halves;
+    for (std::size_t i = 0; i < n; ++i) {
+      halves[2 * i] = x[i].low;
+      halves[2 * i + 1] = x[i].high;
+    }
+    return halves;
+  } else {
+    return x;
+  }
+}
+
+/// Numbers of x in another order: of two registers by one permutation, of each further one by
+/// another.
+template <auto numbers, class V, std::size_t n>
+[[nodiscard]] HAMOTOR_INLINE inline V permuted(const std::array<V, n>& x) noexcept {
+  constexpr int width = static_cast<int>(numbers.size());
+  constexpr auto is_read = [](int from) {
+    return std::ranges::any_of(numbers, [=](int number) { return number / width == from; });
+  };
+  constexpr int first = *std::ranges::min_element(numbers) / width;
+  constexpr int second = [=] {
+    int from = first + 1;
+    while (from < static_cast<int>(n) && !is_read(from)) ++from;
+    return from < static_cast<int>(n) ? from : first;
+  }();
+  constexpr auto places = std::make_index_sequence<numbers.size()>{};
+  V result = [&]<std::size_t... l>(std::index_sequence<l...>) {
+    return __builtin_shufflevector(
+        x[first], x[second], (numbers[l] % width + (numbers[l] / width > first ? width : 0))...);
+  }(places);
+  [&]<std::size_t... c>(std::index_sequence<c...>) {
+    const auto take = [&](auto from_) {
+      constexpr int from = static_cast<int>(decltype(from_)::value);
+      if constexpr (from > second && is_read(from)) {
+        result = [&]<std::size_t... l>(std::index_sequence<l...>) {
+          return __builtin_shufflevector(
+              result, x[from],
+              (numbers[l] / width == from ? width + numbers[l] % width : static_cast<int>(l))...);
+        }(places);
+      }
+    };
+    (take(std::integral_constant<std::size_t, c>{}), ...);
+  }(std::make_index_sequence<n>{});
+  return result;
+}
+
+/// The same, eight numbers in any registers.
+template <auto numbers, class V, std::size_t n>
+[[nodiscard]] HAMOTOR_INLINE inline V taken(const std::array<V, n>& x) noexcept {
+  if constexpr (requires { x[0].low; }) {
+    constexpr auto part = [](std::size_t from) {
+      return std::array{numbers[from], numbers[from + 1], numbers[from + 2], numbers[from + 3]};
+    };
+    const auto halves = in_registers(x);
+    return {permuted<part(0)>(halves), permuted<part(4)>(halves)};
+  } else {
+    return permuted<numbers>(x);
+  }
+}
+
+template <class S>
 [[nodiscard]] HAMOTOR_INLINE inline Lanes<S> load(const S* from) noexcept {
-  Lanes<S> x;
-  __builtin_memcpy(&x, from, sizeof x);
-  return x;
+  if constexpr (requires(Lanes<S> x) { x.low; }) {
+    return {at<4>(from), at<4>(from + 4)};
+  } else {
+    return at<8>(from);
+  }
 }
 
 template <class S>
 HAMOTOR_INLINE inline void store(S* to, const Lanes<S>& x) noexcept {
-  __builtin_memcpy(to, &x, sizeof x);
+  if constexpr (requires { x.low; }) {
+    at<4>(to) = x.low;
+    at<4>(to + 4) = x.high;
+  } else {
+    at<8>(to) = x;
+  }
 }
 
 /// Σ c_r x_r over r < count; terms without weight are left out.
@@ -179,7 +314,11 @@ template <class S, std::size_t n, std::size_t most>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE inline Lanes<S> packed_max(const Lanes<S>& a,
                                                         const Lanes<S>& b) noexcept {
-  return a > b ? a : b;
+  if constexpr (requires { a.low; }) {
+    return {a.low > b.low ? a.low : b.low, a.high > b.high ? a.high : b.high};
+  } else {
+    return a > b ? a : b;
+  }
 }
 
 /// |x|.
@@ -241,9 +380,9 @@ template <class S, std::size_t n>
   for (std::size_t i = 0; i < n; i += 8) {
     top = packed_max<S>(top, packed_size<S>(load<S>(x.data() + i)) * load<S>(scale.data() + i));
   }
-  top = packed_max<S>(top, __builtin_shufflevector(top, top, 4, 5, 6, 7, 0, 1, 2, 3));
-  top = packed_max<S>(top, __builtin_shufflevector(top, top, 2, 3, 0, 1, 6, 7, 4, 5));
-  top = packed_max<S>(top, __builtin_shufflevector(top, top, 1, 0, 3, 2, 5, 4, 7, 6));
+  top = packed_max<S>(top, taken<std::array{4, 5, 6, 7, 0, 1, 2, 3}>(std::array{top}));
+  top = packed_max<S>(top, taken<std::array{2, 3, 0, 1, 6, 7, 4, 5}>(std::array{top}));
+  top = packed_max<S>(top, taken<std::array{1, 0, 3, 2, 5, 4, 7, 6}>(std::array{top}));
   return top[0];
 }
 
@@ -254,8 +393,8 @@ template <class S, std::size_t n>
   for (std::size_t i = 0; i < n; i += 8) {
     sum = packed_mul_add(Lanes<S>{}, load<S>(x.data() + i), sum);
   }
-  sum += __builtin_shufflevector(sum, sum, 4, 5, 6, 7, 0, 1, 2, 3);
-  sum += __builtin_shufflevector(sum, sum, 2, 3, 0, 1, 6, 7, 4, 5);
+  sum += taken<std::array{4, 5, 6, 7, 0, 1, 2, 3}>(std::array{sum});
+  sum += taken<std::array{2, 3, 0, 1, 6, 7, 4, 5}>(std::array{sum});
   return sum[0] + sum[1] == S(0);
 }
 
@@ -276,7 +415,7 @@ HAMOTOR_INLINE inline void add_compensated(std::array<S, n>& x, std::array<S, n>
 /// What is done for each of a number of packs.
 template <std::size_t count, class Action>
 HAMOTOR_INLINE inline void each(Action action) noexcept {
-  [&]<std::size_t... t>(std::index_sequence<t...>) {
+  [&]<std::size_t... t>(std::index_sequence<t...>) __attribute__((always_inline)) {
     (action(std::integral_constant<std::size_t, t>{}), ...);
   }(std::make_index_sequence<count>{});
 }
@@ -286,7 +425,11 @@ template <class S, std::size_t products, std::size_t orders>
 class CauchySums {
   using V = Lanes<S>;
   /// Of which registers hold a factor and two sums, or four.
+#ifdef __AVX512F__
   static constexpr std::size_t held = 8;
+#else
+  static constexpr std::size_t held = 16 / sizeof(S);
+#endif
   static constexpr std::size_t few = 0;
 
  public:
@@ -392,8 +535,9 @@ class PackedSeries {
       put(k, in_units, change, now, x);
       if (k == p) return;
       if (k == 1) at_1_ = weighted_factors(now);
-      Rows sums{};
-      Rows later{};
+      Rows sums;
+      Rows later;
+      each<products>([&](auto t) { sums[t] = later[t] = V{}; });
       if (k > 1) rows_.add_inner(k, sums, later);
       change = derivatives(k, now, weighted(sums, edge), edge);
       put(k + 1, in_units, change, now, x);
@@ -403,35 +547,6 @@ class PackedSeries {
   }
 
  private:
-  /// Lanes of x in another order: of two packs by one permutation, of each further one by another.
-  template <std::array<int, 8> lanes>
-  [[nodiscard]] HAMOTOR_INLINE static V taken(const X& x) noexcept {
-    constexpr auto is_read = [](int pack) {
-      return std::ranges::any_of(lanes, [=](int lane) { return lane / 8 == pack; });
-    };
-    constexpr int first = *std::ranges::min_element(lanes) / 8;
-    constexpr int second = [=] {
-      int pack = first + 1;
-      while (pack < static_cast<int>(packs) && !is_read(pack)) ++pack;
-      return pack < static_cast<int>(packs) ? pack : first;
-    }();
-    constexpr auto places = std::make_index_sequence<8>{};
-    V result = [&]<std::size_t... l>(std::index_sequence<l...>) {
-      return __builtin_shufflevector(x[first], x[second],
-                                     (lanes[l] % 8 + (lanes[l] / 8 > first ? 8 : 0))...);
-    }(places);
-    each<packs>([&](auto c) {
-      constexpr int pack = decltype(c)::value;
-      if constexpr (pack > second && is_read(pack)) {
-        result = [&]<std::size_t... l>(std::index_sequence<l...>) {
-          return __builtin_shufflevector(
-              result, x[pack], (lanes[l] / 8 == pack ? 8 + lanes[l] % 8 : static_cast<int>(l))...);
-        }(places);
-      }
-    });
-    return result;
-  }
-
   /// weight · x[left] and weight · x[right] of each of the products.
   [[nodiscard]] HAMOTOR_INLINE static Factors weighted_factors(const X& x) noexcept {
     Factors result;
