@@ -46,7 +46,7 @@ MEMBERS = _words("cast components from identity names size")
 """Members of every element type."""
 
 RUNTIME = _words(
-    """detail generic has_fused_multiply_add inertia less onto scene scene_abi space_of test all any
+    """detail generic has_fused_multiply_add inertia less less_product onto scene scene_abi space_of test all any
     clean install help package package_source edit_cache rebuild_cache list_install_components
     elements kernels"""
 )

@@ -59,19 +59,19 @@ HAMOTOR_INLINE inline void move_by(const std::array<S, n>& x, const S& h, const 
   const auto add = [&](const S& weight, std::size_t r, std::array<V, n / 4>& onto) {
     for (std::size_t i = 0; i < n / 4; ++i) {
       onto[i] =
-          packed_mul_add(V{weight, weight, weight, weight}, at<4>(y[r].data() + 4 * i), onto[i]);
+          packed_mul_add(V{weight, weight, weight, weight}, read<4>(y[r].data() + 4 * i), onto[i]);
     }
   };
   each<count - 1>([&](auto r) {
     if constexpr (present[r]) add(c[r], r, sum);
   });
   for (std::size_t i = 0; i < n / 4; ++i) {
-    sum[i] = packed_mul_add(V{h, h, h, h}, sum[i], at<4>(x.data() + 4 * i));
+    sum[i] = packed_mul_add(V{h, h, h, h}, sum[i], read<4>(x.data() + 4 * i));
   }
   // Of the slope found last one operation waits.
   if constexpr (present[count - 1]) add(h * c[count - 1], count - 1, sum);
   for (std::size_t i = 0; i < n / 4; ++i) {
-    at<4>(result.data() + 4 * i) = sum[i];
+    write<4>(result.data() + 4 * i, sum[i]);
   }
 }
 
@@ -83,7 +83,7 @@ HAMOTOR_INLINE inline void put_together(const std::array<S, n>& from,
   each<n / 4>([&](auto i) {
     constexpr std::size_t k = 4 * i;
     const HalfLanes<S> x{from[k], from[k + 1], from[k + 2], from[k + 3]};
-    at<4>(to.data() + k) = x;
+    write<4>(to.data() + k, x);
   });
 }
 #endif

@@ -112,17 +112,20 @@ struct HalfPack {
 template <class S>
 using HalfLanes = typename HalfPack<S>::Lanes;
 
-/// W numbers in memory as a vector, wherever they begin.  Not by memcpy, of which g++ 12 makes
-/// moves of 16 bytes.
+/// W numbers as a vector, and the same in memory, wherever they begin.  Not by memcpy, of which g++
+/// 12 makes moves of 16 bytes.
 template <class S, std::size_t W>
-struct InMemory {
-  using type [[gnu::vector_size(W * sizeof(S)), gnu::aligned(sizeof(S)), gnu::may_alias]] = S;
+struct VectorOf {
+  using type [[gnu::vector_size(W * sizeof(S))]] = S;
+  using InMemory [[gnu::vector_size(W * sizeof(S)), gnu::aligned(sizeof(S)), gnu::may_alias]] = S;
 };
 template <std::size_t W, class S>
-[[nodiscard]] HAMOTOR_INLINE inline auto& at(S* numbers) noexcept {
-  using Number = std::remove_const_t<S>;
-  using Vector = typename InMemory<Number, W>::type;
-  return *reinterpret_cast<std::conditional_t<std::is_const_v<S>, const Vector, Vector>*>(numbers);
+[[nodiscard]] HAMOTOR_INLINE inline typename VectorOf<S, W>::type read(const S* from) noexcept {
+  return *reinterpret_cast<const typename VectorOf<S, W>::InMemory*>(from);
+}
+template <std::size_t W, class S>
+HAMOTOR_INLINE inline void write(S* to, const typename VectorOf<S, W>::type& x) noexcept {
+  *reinterpret_cast<typename VectorOf<S, W>::InMemory*>(to) = x;
 }
 
 #if defined(__AVX2__) && defined(__FMA__)
@@ -277,19 +280,19 @@ template <auto numbers, class V, std::size_t n>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE inline Lanes<S> load(const S* from) noexcept {
   if constexpr (requires(Lanes<S> x) { x.low; }) {
-    return {at<4>(from), at<4>(from + 4)};
+    return {read<4>(from), read<4>(from + 4)};
   } else {
-    return at<8>(from);
+    return read<8>(from);
   }
 }
 
 template <class S>
 HAMOTOR_INLINE inline void store(S* to, const Lanes<S>& x) noexcept {
   if constexpr (requires { x.low; }) {
-    at<4>(to) = x.low;
-    at<4>(to + 4) = x.high;
+    write<4>(to, x.low);
+    write<4>(to + 4, x.high);
   } else {
-    at<8>(to) = x;
+    write<8>(to, x);
   }
 }
 
