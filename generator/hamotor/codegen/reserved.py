@@ -46,9 +46,9 @@ MEMBERS = _words("cast components from identity names size")
 """Members of every element type."""
 
 RUNTIME = _words(
-    """detail generic has_fused_multiply_add inertia less less_product onto scene scene_abi space_of test all any
-    clean install help package package_source edit_cache rebuild_cache list_install_components
-    elements kernels"""
+    """detail generic has_fused_multiply_add inertia less less_product onto scene scene_abi space_of
+    test all any clean install help package package_source edit_cache rebuild_cache
+    list_install_components elements kernels"""
 )
 """What else an algebra cannot be called: names in the namespace hamotor, CMake targets, files."""
 
