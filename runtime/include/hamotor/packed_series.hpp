@@ -1,4 +1,4 @@
-// Eight coordinates of a Taylor series in a register: its sum, and the coefficients of
+// Eight coordinates of a Taylor series in a register, or two: its sum, and the coefficients of
 // ẋ = c + L x + Q(x, x).
 #pragma once
 
