@@ -130,6 +130,32 @@ struct GeneratedLean : Generated<S> {
   }
 };
 
+/// Runge–Kutta's method as the runtime's `Rk4` takes its steps, which holds a body in the world
+/// from one to the next.
+template <class S>
+struct GeneratedStepper : Generated<S> {
+  static constexpr const char* name = "generated, Rk4";
+  using System = typename Generated<S>::System;
+  using Stages = hamotor::detail::WorldStages<System>;
+  using Carried = typename Stages::Carried;
+
+  [[nodiscard]] static Carried make(kind::Body, const Body<Quad>& x) {
+    return stages.carried({{x.motion.template cast<S>()}, {x.momentum.template cast<S>()}});
+  }
+  [[nodiscard]] static Body<Quad> exact(kind::Body, const Carried& x) {
+    const auto state = stages.state(x);
+    return {state.motors[0].template cast<Quad>(), state.momenta[0].template cast<Quad>()};
+  }
+  [[nodiscard]] HAMOTOR_INLINE static Carried runge_kutta(const Carried& body) {
+    Carried stepped = body;
+    static_cast<void>(stages.step(stepped));
+    return stepped;
+  }
+
+ private:
+  static inline const Stages stages{Generated<S>::system(), static_cast<S>(step_size)};
+};
+
 template <class Op>
 Values reference(const Exact<typename Op::A>& a, const Exact<typename Op::B>& b) {
   return values(Op::template run<Generated<Quad>>(a, b));
@@ -173,6 +199,7 @@ void enter_generated() {
   enter_for<GeneratedLean, operation::Log>();
   enter_for<GeneratedLean, operation::ExpLog>();
   enter_for<GeneratedLean, operation::Normalize>();
+  enter_for<GeneratedStepper, operation::RungeKutta>();
 }
 
 }  // namespace bench

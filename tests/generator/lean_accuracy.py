@@ -27,6 +27,10 @@ FLOAT: Mapping[str, Callable[..., Any]] = {
     "sin": np.sin,
     "cos": np.cos,
     "acos": np.arccos,
+    "abs": np.abs,
+    "max_abs": lambda *x: max(map(abs, x)),
+    "rounding": lambda: np.float64(2.0**-44),
+    "moderate": lambda: np.float64(2.0**208),
 }
 """The scalar functions in doubles."""
 
@@ -111,6 +115,15 @@ class Measure:
 
     def error(self, dice: random.Random, angle: float, translation: float) -> float:
         """Distance from the truth in units of the last place of the result's norm."""
+        return self.numbers_and_error(dice, angle, translation)[1]
+
+    def numbers_and_error(
+        self, dice: random.Random, angle: float, translation: float, factor: float = 1.0
+    ) -> tuple[list[float], float]:
+        """The kernel's argument, and how far its result is from the truth.
+
+        factor: a logarithm's argument is this times the versor whose logarithm is the truth.
+        """
         (operand,) = self.kernel.operands
         result = self.kernel.program.result
         rates = operand if self.kernel.name in ("exp_lean", "cayley_lean") else result
@@ -121,7 +134,7 @@ class Measure:
                     truth = self.exponential(self.value(numbers, operand))
                 case "log_lean":
                     truth = self.bivector(dice, angle, translation, rates)
-                    numbers = self.held(self.exponential(truth), operand)
+                    numbers = self.held(scaled(factor, self.exponential(truth)), operand)
                 case "cayley_lean":
                     size = float(mpmath.tan(mpmath.mpf(angle) / 2))
                     numbers = self.held(self.bivector(dice, size, translation, rates), operand)
@@ -137,7 +150,7 @@ class Measure:
                     numbers = self.held(scaled(weight, exact), operand)
                     truth = exact
             found = self.value(self.run(numbers), result)
-            return float(self._distance(found, truth) / self._size(truth) * 2**53)
+            return numbers, float(self._distance(found, truth) / self._size(truth) * 2**53)
 
     def _cayley(self, b: Value) -> Value:
         """(1 + B)(1 − B)⁻¹ = (1 + B)² (1 − B²)⁻¹, where 1 − B² = n + w and w² = 0."""

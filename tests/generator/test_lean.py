@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import math
+import random
+from collections.abc import Sequence
+from dataclasses import replace
 
+import numpy as np
 import pytest
-from tests.generator.lean_accuracy import Measure, lean_kernels, worst
+from tests.generator.lean_accuracy import ALGEBRAS, FLOAT, Measure, inputs, lean_kernels, worst
 
+from hamotor.codegen import read_algebra
 from hamotor.codegen.kernel import Kernel
+from hamotor.codegen.library import library
+from hamotor.codegen.spec import bundled_path
 
 KERNELS = lean_kernels()
 IDS = [f"{algebra} {k.namespace} {k.name} {k.operands[0].name}" for algebra, k in KERNELS]
@@ -83,3 +90,84 @@ def test_costs_are_at_or_below_the_lowest_known(name: tuple[str, str, str]) -> N
     assert (cost.mul, cost.add, cost.div) == COSTS[name]
     called = set(cost.calls) - {"select"}
     assert called == ({"sqrt", "sin", "cos"} if name[2] == "exp_lean" else {"sqrt", "acos"})
+
+
+# ---------------------------------------------------------------- shortcuts
+
+SHORTENED = [
+    (algebra, kernel)
+    for algebra in ALGEBRAS
+    for kernel in library(read_algebra(bundled_path(algebra)))
+    if kernel.shortcut is not None
+]
+SHORTENED_IDS = [f"{a} {k.namespace} {k.name} {k.operands[0].name}" for a, k in SHORTENED]
+
+
+def taken(kernel: Kernel, numbers: Sequence[float]) -> dict[str, bool]:
+    """Which conditions of the kernel's shortcut hold for these components."""
+    assert kernel.shortcut is not None
+    (parameter,) = kernel.program.parameters
+    components = parameter.element.components
+    values = {
+        f"{parameter.name}.{c.name}": np.float64(x)
+        for c, x in zip(components, numbers, strict=True)
+    }
+    with np.errstate(all="ignore"):
+        found = kernel.shortcut.where.evaluate(values, FLOAT)
+    return {name: bool(x > 0) for name, x in found.items()}
+
+
+def farthest(kernel: Kernel) -> float:
+    """The half angle up to which a kernel takes its shortcut."""
+    assert kernel.shortcut is not None
+    pitched = "moderate" in dict(kernel.shortcut.where.outputs)
+    return HALF_TURN if pitched else math.acos(-7 / 8)
+
+
+def test_the_logarithms_have_shortcuts() -> None:
+    assert len(SHORTENED) == 7
+    assert {kernel.name for _, kernel in SHORTENED} == {"log"}
+
+
+@pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
+def test_a_shortcut_is_taken_for_unit_versors_and_as_accurate(algebra: str, kernel: Kernel) -> None:
+    assert kernel.shortcut is not None
+    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
+    measure, dice = Measure(algebra, short), random.Random(2)
+    for angle, translation in inputs(dice, 0.999 * farthest(kernel), 60):
+        numbers, error = measure.numbers_and_error(dice, angle, translation)
+        assert all(taken(kernel, numbers).values()), (angle, translation)
+        assert error <= 4, (angle, translation)
+
+
+@pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
+def test_what_is_not_unit_counts_once_in_a_shortcut(algebra: str, kernel: Kernel) -> None:
+    assert kernel.shortcut is not None
+    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
+    measure, dice = Measure(algebra, short), random.Random(4)
+    defect = 240 * 2.0**-52
+    for angle, translation in inputs(dice, 0.999 * farthest(kernel), 60):
+        for sign in (1, -1):
+            factor = 1 + sign * defect / 2
+            numbers, error = measure.numbers_and_error(dice, angle, translation, factor)
+            assert all(taken(kernel, numbers).values()), (angle, translation)
+            assert error <= 4 + defect * 2**53, (angle, translation)
+
+
+@pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
+def test_a_shortcut_is_not_taken_where_it_would_be_wrong(algebra: str, kernel: Kernel) -> None:
+    assert kernel.shortcut is not None
+    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
+    measure, dice = Measure(algebra, short), random.Random(3)
+    beyond, _ = measure.numbers_and_error(dice, farthest(kernel) + 0.01, 1.0)
+    assert not taken(kernel, beyond)["angle"]
+    numbers, _ = measure.numbers_and_error(dice, 1.0, 1.0)
+    for factor in (1 + 1e-12, 1 - 1e-12, 2.0, -0.5, 0.0, 1e200, math.nan):
+        assert not all(taken(kernel, [factor * x for x in numbers]).values()), factor
+    if farthest(kernel) == HALF_TURN:
+        names = [c.name for c in kernel.operands[0].components]
+        quad = max(range(len(names)), key=lambda i: len(names[i]))
+        slipped = [x + 1e-12 * (i == quad) for i, x in enumerate(numbers)]
+        assert not taken(kernel, slipped)["motor"]
+        far, _ = measure.numbers_and_error(dice, 1e-8, 1e100)
+        assert not taken(kernel, far)["moderate"]

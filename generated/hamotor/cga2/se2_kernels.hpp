@@ -150,26 +150,44 @@ template <class S>
 /// Principal: exp(log M) = M with half angle in [0, π].  Relative error at most 4 ulp of the
 /// result's norm.
 /// −T, T ≠ 1 a translation, has no logarithm here; that of T, the same motion, is given.
+/// By a shortcut for half angles up to 2.6 where M ~M = 1 + δ, |δ| < 256 ε, whose error is
+/// up to |δ| more; elsewhere M stands for the unit versor nearest to it.
 /// Cost: 14 mul, 1 add, 3 div, 1 atan2, 1 compensated_dot_parts, 2 max_abs, 1 pi, 1 scaling, 9
+/// select, 1 sqrt; by the shortcut 8 mul, 5 add (2 fused), 1 div, 1 abs, 1 acos, 1 rounding, 2
 /// select, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> log(const Motor<S>& m) noexcept {
-  const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
-  const S r_e12 = r_scaling.in * m.e12;
-  const auto squares = scalar::compensated_dot_parts(r_e12, r_e12);
-  const S square = squares.hi + squares.lo;
-  const S length = scalar::sqrt(square);
-  const S sine = length * r_scaling.out;
-  const S angle = scalar::atan2(sine, m.s);
-  const S stretch = select(length > S(0), select(m.s > S(0), angle / sine, angle / length), S(0));
-  const S half_turn = select(-m.s > S(0), scalar::pi<S>(), S(0));
-  const S straight = S(1) / m.s;
-  const S root = select(m.s > S(0), S(1), r_scaling.root_in);
-  const S q_size = scalar::max_abs(m.e1i, m.e2i);
-  const S turned = select(q_size > S(0), S(0), half_turn);
-  return {.w12 = S(-2) * select(length > S(0), stretch * select(m.s > S(0), m.e12, r_e12), turned),
-          .v1 = S(-2) * select(length > S(0), stretch * m.e1i * root * root, straight * m.e1i),
-          .v2 = S(-2) * select(length > S(0), stretch * m.e2i * root * root, straight * m.e2i)};
+  const S defect = mul_add(m.s, m.s, m.e12 * m.e12 + S(-1));
+  const auto usual =
+      (m.s + S(0.875)) > S(0) && (scalar::rounding<S>() - scalar::abs(defect)) > S(0);
+  const auto shortly = [&]() noexcept -> se2::Rate<S> {
+    const S square = select(m.s > S(0), scalar::fma(-m.s, m.s, S(1)), m.e12 * m.e12);
+    const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
+    const S scaled = S(2) * stretch;
+    return {.w12 = -(scaled * m.e12), .v1 = -(scaled * m.e1i), .v2 = -(scaled * m.e2i)};
+  };
+  if (scalar::everywhere(usual)) [[likely]] {
+    return shortly();
+  }
+  return scalar::chosen(usual, shortly, [=]() noexcept -> se2::Rate<S> {
+    const auto r_scaling = scalar::scaling(scalar::max_abs(m.e12));
+    const S r_e12 = r_scaling.in * m.e12;
+    const auto squares = scalar::compensated_dot_parts(r_e12, r_e12);
+    const S square = squares.hi + squares.lo;
+    const S length = scalar::sqrt(square);
+    const S sine = length * r_scaling.out;
+    const S angle = scalar::atan2(sine, m.s);
+    const S stretch = select(length > S(0), select(m.s > S(0), angle / sine, angle / length), S(0));
+    const S half_turn = select(-m.s > S(0), scalar::pi<S>(), S(0));
+    const S straight = S(1) / m.s;
+    const S root = select(m.s > S(0), S(1), r_scaling.root_in);
+    const S q_size = scalar::max_abs(m.e1i, m.e2i);
+    const S turned = select(q_size > S(0), S(0), half_turn);
+    return {
+        .w12 = S(-2) * select(length > S(0), stretch * select(m.s > S(0), m.e12, r_e12), turned),
+        .v1 = S(-2) * select(length > S(0), stretch * m.e1i * root * root, straight * m.e1i),
+        .v2 = S(-2) * select(length > S(0), stretch * m.e2i * root * root, straight * m.e2i)};
+  });
 }
 
 /// cayley: Rate -> Motor

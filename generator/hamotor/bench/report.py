@@ -16,6 +16,7 @@ _COLOURS = {
     "generated": _BLUE,
     "generated, lean": "#4f9bd9",
     "generated, converted": "#9cc7ea",
+    "generated, Rk4": "#1b4f8a",
     "Eigen quaternion + translation": _ORANGE,
     "Eigen Isometry3": _VERMILLION,
     "Eigen Isometry3, converted": "#f0b08a",

@@ -21,7 +21,7 @@ from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import library
-from hamotor.codegen.program import Call, Program
+from hamotor.codegen.program import Call, Cost, Program
 from hamotor.codegen.spec import AlgebraSpec
 
 if TYPE_CHECKING:
@@ -201,6 +201,7 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
         kept, possible = kernel.pairs
         sparsity = f"{kept} of {possible} pairs of components"
     cost = kernel.program.cost
+    short = shortcut_cost(kernel)
     whole = cost.total + _operations_of_calls(kernel.program)
     inlined = cost.total <= INLINED_OPERATIONS and (
         not cost.calls.keys() - {"compensated_sum"}
@@ -210,12 +211,25 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
         "title": kernel_title(kernel),
         "law": kernel.law,
         "notes": kernel.notes,
-        "cost": str(kernel.program.cost),
+        "cost": str(cost) if short is None else f"{cost}; by the shortcut {short}",
         "sparsity": sparsity,
         "attributes": "[[nodiscard]]" + " HAMOTOR_INLINE" * inlined,
         "signature": cpp.signature_text(kernel.name, kernel.program),
-        "body": [*_packed_body(kernel), *cpp.body_lines(kernel.program)],
+        "body": _body(kernel),
     }
+
+
+def shortcut_cost(kernel: Kernel) -> Cost | None:
+    """Operations where a kernel takes its shortcut, with those that decide."""
+    if kernel.shortcut is None:
+        return None
+    return kernel.shortcut.where.cost + kernel.shortcut.program.cost
+
+
+def _body(kernel: Kernel) -> list[str]:
+    if kernel.shortcut is not None:
+        return cpp.shortcut_lines(kernel.shortcut, kernel.program)
+    return [*_packed_body(kernel), *cpp.body_lines(kernel.program)]
 
 
 def _operations_of_calls(program: Program) -> int:
@@ -347,6 +361,7 @@ def _index(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
                 "polynomial": kernel.meaning is not None,
                 "cost": kernel.program.cost.as_data(),
             }
+            | ({"shortcut": short.as_data()} if (short := shortcut_cost(kernel)) else {})
             for kernel in kernels
         ],
     }

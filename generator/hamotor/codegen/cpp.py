@@ -18,6 +18,7 @@ from hamotor.codegen.program import (
     Program,
     Quotient,
     Select,
+    Shortcut,
     Sum,
     walk,
 )
@@ -191,3 +192,20 @@ def body_lines(program: Program) -> list[str]:
     fields = ", ".join(f".{name} = {expression_text(e)}" for name, e in program.outputs)
     lines.append(f"return {{{fields}}};")
     return lines
+
+
+def shortcut_lines(shortcut: Shortcut, general: Program) -> list[str]:
+    """Statements of a function that takes a shortcut where it may, unformatted."""
+    conditions = [f"{_wrapped(x, _PRODUCT)} > S(0)" for _, x in shortcut.where.outputs]
+    result = f"() noexcept -> {scalar_type(general.result)}"
+    return [
+        *binding_lines(shortcut.where),
+        f"const auto usual = {' && '.join(conditions)};",
+        f"const auto shortly = [&]{result} {{",
+        *body_lines(shortcut.program),
+        "};",
+        "if (scalar::everywhere(usual)) [[likely]] { return shortly(); }",
+        f"return scalar::chosen(usual, shortly, [=]{result} {{",
+        *body_lines(general),
+        "});",
+    ]

@@ -32,6 +32,7 @@ from hamotor.codegen.program import (
     Parameter,
     Product,
     Program,
+    Shortcut,
     Sum,
     number,
     number_expression,
@@ -46,9 +47,10 @@ BladeProduct = Callable[[Blade, Blade], Multivector]
 class Kernel:
     """One function of the generated library.
 
-    name:    C++ function name; law: what it computes, in formulas, for its documentation.
-    meaning: component → polynomial in `parameter.component`; None for transcendental kernels.
-    pairs:   (kept, possible) products of components, the sparsity of a bilinear kernel.
+    name:     C++ function name; law: what it computes, in formulas, for its documentation.
+    program:  for every input; shortcut: for most, where there is a shorter one.
+    meaning:  component → polynomial in `parameter.component`; None for transcendental kernels.
+    pairs:    (kept, possible) products of components, the sparsity of a bilinear kernel.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Kernel:
     namespace: str = ""
     pairs: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
+    shortcut: Shortcut | None = None
 
     @property
     def operands(self) -> tuple[Element, ...]:

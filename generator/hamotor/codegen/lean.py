@@ -8,10 +8,11 @@ maps and the lean normalisation are the general ones of `closedform.py`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from fractions import Fraction
 
-from hamotor.codegen import closedform
+from hamotor.codegen import closedform, transcendental
 from hamotor.codegen.algebra import Algebra, Blade, Rational, grade, magnitude
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel, parameters_for, value_of
@@ -24,6 +25,7 @@ from hamotor.codegen.program import (
     Program,
     Quotient,
     Select,
+    Shortcut,
     Sum,
     negative,
     number,
@@ -41,6 +43,7 @@ from hamotor.codegen.transcendental import (
 from hamotor.codegen.writer import Writer, outputs_for
 from hamotor.errors import UsageError
 
+Bindings = tuple[tuple[str, Expression], ...]
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
 
 
@@ -104,9 +107,25 @@ def exp_kernel(
     )
 
 
-def log_kernel(
-    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
-) -> Kernel:
+def _plain_blades(operand: Element, where: str) -> dict[Blade, Expression]:
+    """The operand's coefficients; UsageError where they are not its components but for signs."""
+    (parameter,) = parameters_for(operand)
+    m: dict[Blade, Expression] = {}
+    for blade, p in value_of(parameter).items():
+        (((name,), x),) = p.items()
+        if abs(x) != 1:
+            raise UsageError(f"{where}: {operand.name} must be stored in plain blades")
+        m[blade] = Name(name) if x > 0 else Negative(Name(name))
+    return m
+
+
+def _squares(m: Mapping[Blade, Expression], blades: Iterable[Blade]) -> Expression:
+    return sum_of_products([(x, x) for x in (_unsigned(m[blade]) for blade in blades)])
+
+
+def _log_program(
+    algebra: Algebra, operand: Element, result: Element, where: str, *, turned_far: bool = False
+) -> Program:
     """Logarithm of a unit versor M = c + r + q + p by sin²θ = 1 − c²: a = θ / sin θ, θ = acos c.
 
     a r for the rotation part, a q + (a c − 1) p / sin²θ J(r) for the translation part.  For small
@@ -114,19 +133,16 @@ def log_kernel(
     is needed for θ, so that acos and the root go side by side.
     """
     (parameter,) = parameters_for(operand)
-    value = value_of(parameter)
-    plane = required_split(algebra, [b for b in sorted(value) if grade(b) == 2], where)
+    m = _plain_blades(operand, where)
+    plane = required_split(algebra, [b for b in sorted(m) if grade(b) == 2], where)
     factor = _one_factor({magnitude(x) for f in result.reading for x in f.values()}, where)
-    m: dict[Blade, Expression] = {}
-    for blade, p in value.items():
-        (((name,), x),) = p.items()
-        if abs(x) != 1:
-            raise UsageError(f"{where}: {operand.name} must be stored in plain blades")
-        m[blade] = Name(name) if x > 0 else Negative(Name(name))
     cosine = m[0]
     writer = Writer()
     # acos knows c, not sin θ: where the processor does not fuse, this must be rounded once as well.
-    square = writer.let("square", call("fma", negative(cosine), cosine, ONE))
+    square: Expression = call("fma", negative(cosine), cosine, ONE)
+    if turned_far and not plane.pitch:
+        square = Select(cosine, square, _squares(m, plane.rotation))
+    square = writer.let("square", square)
     angle = call("acos", cosine)
     if plane.pitch:
         inverse = writer.let("inverse", Quotient(ONE, square))
@@ -138,9 +154,10 @@ def log_kernel(
     r = {blade: m[blade] for blade in plane.rotation}
     out: dict[Blade, Expression] = {blade: Product(scaled, x) for blade, x in r.items()}
     if plane.pitch:
-        slope = Product(m[quadrivector(plane)], inverse)
-        rest = MultiplyAdd(stretch, cosine, number(-1))
-        along = writer.let("along", Select(square, Product(_times(factor, rest), slope), ZERO))
+        quad = m[quadrivector(plane)]
+        rest = _times(factor, MultiplyAdd(stretch, cosine, number(-1)))
+        slope = Product(quad, inverse)
+        along = writer.let("along", Select(square, Product(rest, slope), ZERO))
         turned = axis_part(plane, r)
         for blade in plane.translation:
             out[blade] = MultiplyAdd(along, turned[blade], Product(scaled, m[blade]))
@@ -151,8 +168,57 @@ def log_kernel(
     for component, functional in zip(result.components, result.reading, strict=True):
         ((blade, x),) = functional.items()
         outputs.append((component.name, out[blade] if x > 0 else negative(out[blade])))
-    program = Program((parameter,), tuple(writer.bindings), tuple(outputs), result)
+    return Program((parameter,), tuple(writer.bindings), tuple(outputs), result)
+
+
+def log_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """Logarithm of a unit versor by the fewest operations."""
+    program = _log_program(algebra, operand, result, where)
     return Kernel("log_lean", "log(M), M ~M = 1", program, None, namespace, None, LOG_NOTES)
+
+
+def shortened_log_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """The logarithm for every unit versor, by the lean one's program wherever that is accurate."""
+    kernel = transcendental.log_kernel(algebra, operand, result, namespace, where)
+    try:
+        program = _log_program(algebra, operand, result, where, turned_far=True)
+    except UsageError:
+        return kernel
+    near = Program(program.parameters, *_near_unity(algebra, operand, where), None)
+    range_ = "below π/2" if "moderate" in dict(near.outputs) else "up to 2.6"
+    notes = (
+        *kernel.notes,
+        f"By a shortcut for half angles {range_} where M ~M = 1 + δ, |δ| < 256 ε, whose error is",
+        "up to |δ| more; elsewhere M stands for the unit versor nearest to it.",
+    )
+    return replace(kernel, shortcut=Shortcut(near, program), notes=notes)
+
+
+def _near_unity(algebra: Algebra, operand: Element, where: str) -> tuple[Bindings, Bindings]:
+    """Where the lean logarithm is accurate: bindings, and numbers that are positive there."""
+    m = _plain_blades(operand, where)
+    plane = required_split(algebra, [b for b in sorted(m) if grade(b) == 2], where)
+    writer = Writer()
+    rounding = call("rounding")
+    rest = Sum(_squares(m, plane.rotation), number(-1))
+    defect = writer.let("defect", MultiplyAdd(m[0], m[0], rest))
+    conditions: dict[str, Expression] = {
+        "angle": m[0] if plane.pitch else Sum(m[0], number(Fraction(7, 8))),
+        "unit": Sum(rounding, negative(call("abs", defect))),
+    }
+    if plane.pitch:
+        quad = m[quadrivector(plane)]
+        size = writer.let("size", call("max_abs", *(m[v] for v in plane.translation), quad))
+        terms = [(negative(x), m[v]) for x, v in pitch_pairs(plane, m)]
+        slip = writer.let("slip", sum_of_products([(m[0], quad), *terms]))
+        excess = MultiplyAdd(rounding, size, negative(call("abs", slip)))
+        conditions["motor"] = Select(size, excess, ONE)
+        conditions["moderate"] = Sum(call("moderate"), negative(size))
+    return tuple(writer.bindings), tuple(conditions.items())
 
 
 EXP_NOTES = (

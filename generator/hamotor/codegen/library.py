@@ -109,6 +109,8 @@ def stepping_requests(spec: AlgebraSpec) -> tuple[Request, ...]:
 def _check_symbols(spec: AlgebraSpec, kernel: Kernel) -> None:
     """Refuse a parameter that is called like one of its kernel's steps."""
     steps = {name for name, _ in kernel.program.bindings}
+    if kernel.shortcut is not None:
+        steps |= {"usual", "shortly", *(name for name, _ in kernel.shortcut.where.bindings)}
     for parameter in kernel.program.parameters:
         if parameter.name in steps:
             raise UsageError(
@@ -537,7 +539,7 @@ def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedFo
         return lean.LEAN[operation]
     simple: dict[str, ClosedForm] = {
         "exp": transcendental.exp_kernel,
-        "log": transcendental.log_kernel,
+        "log": lean.shortened_log_kernel,
         "cayley": transcendental.cayley_kernel,
         "cayley_inverse": transcendental.cayley_inverse_kernel,
     }

@@ -243,6 +243,17 @@ class Program:
         return {name: _evaluate(e, known, functions) for name, e in self.outputs}
 
 
+@dataclass(frozen=True)
+class Shortcut:
+    """A shorter program that is as accurate as another where all outputs of `where` are positive.
+
+    All three have the same parameters, `program` has the other's result.
+    """
+
+    where: Program
+    program: Program
+
+
 def renamed(program: Program, names: Mapping[str, str]) -> Program:
     """The same program with other names for what it reads and gives."""
 

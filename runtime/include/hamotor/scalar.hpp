@@ -610,6 +610,51 @@ template <class S>
   }
 }
 
+/// By how much of its size rounding may have changed a number, after a few operations: 256 ε.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S rounding() noexcept {
+  return S(256) * S(Limits<S>::epsilon());
+}
+
+/// What is far from overflow, also multiplied with itself or divided by ε: 1/ε⁴, 2·10⁶² of doubles.
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE constexpr S moderate() noexcept {
+  const S square = S(Limits<S>::epsilon()) * S(Limits<S>::epsilon());
+  return S(1) / (square * square);
+}
+
+namespace detail {
+
+template <class Make>
+[[nodiscard, gnu::cold, gnu::noinline]] constexpr auto aside(const Make& make) noexcept {
+  return make();
+}
+
+}  // namespace detail
+
+/// Whether a condition holds in all lanes.
+template <class Condition>
+[[nodiscard]] HAMOTOR_INLINE constexpr bool everywhere(const Condition& condition) noexcept {
+  return all(condition);
+}
+
+/// `usual()` in the lanes where the condition holds, which are not all, else `other()`.
+template <class Condition, class Usual, class Other>
+[[nodiscard]] HAMOTOR_INLINE constexpr auto chosen(const Condition& condition, const Usual& usual,
+                                                   const Other& other) noexcept {
+  const auto general = detail::aside(other);
+  if constexpr (std::is_same_v<Condition, bool>) {
+    return general;
+  } else {
+    auto numbers = general.components();
+    const auto usual_ones = detail::aside(usual).components();
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      numbers[i] = select(condition, usual_ones[i], numbers[i]);
+    }
+    return general.from(numbers);
+  }
+}
+
 /// √(x² + y²), whose squares neither overflow nor vanish.
 template <class S>
 [[nodiscard]] constexpr S length(const S& x, const S& y) noexcept {
