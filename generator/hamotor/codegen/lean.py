@@ -4,6 +4,8 @@ The closed forms of `transcendental.py` without what makes those accurate for ev
 number, sums are plain, nothing is scaled.  Both are emitted under names of their own, `exp_lean`
 beside `exp`, and only where a spec asks; their notes say what the saving costs.  The lean Cayley
 maps and the lean normalisation are the general ones of `closedform.py`.
+
+Where the lean logarithm is as accurate as the general one, `log` itself takes it, as a shortcut.
 """
 
 from __future__ import annotations
