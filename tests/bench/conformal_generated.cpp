@@ -11,10 +11,10 @@ struct ConformalGenerated {
 
   template <class Kind>
   [[nodiscard]] static auto make(Kind, const typename Kind::Exact& x) {
-    return x.template cast<S>();
+    return rounded<S>(x);
   }
   [[nodiscard]] static auto make(kind::conformal::MatrixOnVector, const cga3::Versor<Quad>& m) {
-    return vector_matrix(m).template cast<S>();
+    return rounded<S>(vector_matrix(m));
   }
   template <class Kind>
   [[nodiscard]] static auto exact(Kind, const auto& x) {
@@ -48,6 +48,9 @@ struct ConformalGenerated {
 };
 
 }  // namespace
+
+template <>
+inline constexpr const char* name_in_lanes<ConformalGenerated> = "generated, packs";
 
 Values values(const cga3::Versor<Quad>& m) {
   Values all;

@@ -23,6 +23,7 @@
 #include <utility>
 #include <vector>
 
+#include "hamotor/pack.hpp"
 #include "hamotor/pga3/pga3.hpp"
 #include "hamotor/pga3/se3.hpp"
 #include "quad.hpp"
@@ -344,32 +345,94 @@ struct Measured {
   double disagree;  ///< largest relative difference of that from the generated kernel
 };
 
-/// Worst of 1000 random inputs.
-template <template <class> class C, class S, class Op>
+/// What an operation gives for held things of its kinds.
+template <class C, class Op>
+using Given =
+    std::remove_cv_t<decltype(Op::template run<C>(std::declval<const Held<C, typename Op::A>&>(),
+                                                  std::declval<const Held<C, typename Op::B>&>()))>;
+
+/// A contestant's scalar with as many numbers as a register of the processor has.
+template <class S>
+using Lanes = hamotor::Pack<S, hamotor::widest<S>>;
+
+/// Things from `exact` on, one in each lane of what C<Lanes<S>> holds.
+template <template <class> class C, class S, class Kind>
+[[nodiscard]] Held<C<Lanes<S>>, Kind> in_lanes(Kind kind, const Exact<Kind>* exact) {
+  Held<C<Lanes<S>>, Kind> block{};
+  if constexpr (!std::is_same_v<Kind, kind::Nothing>) {
+    using One = Held<C<S>, Kind>;
+    constexpr std::size_t n = std::min(sizeof(One) / sizeof(S), sizeof block / sizeof(Lanes<S>));
+    auto* const numbers = reinterpret_cast<Lanes<S>*>(&block);
+    for (std::size_t lane = 0; lane < Lanes<S>::lanes; ++lane) {
+      const One one = make<C<S>>(kind, exact[lane]);
+      const auto* const from = reinterpret_cast<const S*>(&one);
+      for (std::size_t i = 0; i < n; ++i) numbers[i].set(lane, from[i]);
+    }
+  }
+  return block;
+}
+
+/// The thing in a lane.
+template <class One, class S, class Block>
+[[nodiscard]] One of_lane(const Block& block, std::size_t lane) {
+  constexpr std::size_t n = std::min(sizeof(One) / sizeof(S), sizeof block / sizeof(Lanes<S>));
+  One one{};
+  const auto* const numbers = reinterpret_cast<const Lanes<S>*>(&block);
+  auto* const to = reinterpret_cast<S*>(&one);
+  for (std::size_t i = 0; i < n; ++i) to[i] = numbers[i][lane];
+  return one;
+}
+
+/// Worst of 1000 random inputs; `in_packs`: computed by C<Lanes<S>>, several at once.
+template <template <class> class C, class S, class Op, bool in_packs = false>
 [[nodiscard]] Measured measure() {
   using A = typename Op::A;
   using B = typename Op::B;
+  using Result = Given<C<S>, Op>;
+  constexpr std::size_t count = 1000;
   Source source(2);
+  std::vector<Exact<A>> exact_a;
+  std::vector<Exact<B>> exact_b;
+  for (std::size_t i = 0; i < count; ++i) {
+    exact_a.push_back(source.make(A{}));
+    exact_b.push_back(source.make(B{}));
+  }
+  std::vector<Result> results(count);
+  if constexpr (in_packs) {
+    constexpr std::size_t lanes = Lanes<S>::lanes;
+    for (std::size_t i = 0; i < count; i += lanes) {
+      const std::size_t from = std::min(i, count - lanes);
+      const auto block = Op::template run<C<Lanes<S>>>(in_lanes<C, S>(A{}, &exact_a[from]),
+                                                       in_lanes<C, S>(B{}, &exact_b[from]));
+      for (std::size_t lane = 0; lane < lanes; ++lane)
+        results[from + lane] = of_lane<Result, S>(block, lane);
+    }
+  } else {
+    for (std::size_t i = 0; i < count; ++i)
+      results[i] = Op::template run<C<S>>(make<C<S>>(A{}, exact_a[i]), make<C<S>>(B{}, exact_b[i]));
+  }
   Measured worst{0.0, 0.0};
-  for (int i = 0; i < 1000; ++i) {
-    const auto exact_a = source.make(A{});
-    const auto exact_b = source.make(B{});
-    const auto a = make<C<S>>(A{}, exact_a);
-    const auto b = make<C<S>>(B{}, exact_b);
-    const auto wide_a = widened<Held<C<Quad>, A>, S>(a);
-    const auto wide_b = widened<Held<C<Quad>, B>, S>(b);
-    const auto result = Op::template run<C<S>>(a, b);
+  for (std::size_t i = 0; i < count; ++i) {
+    const auto wide_a = widened<Held<C<Quad>, A>, S>(make<C<S>>(A{}, exact_a[i]));
+    const auto wide_b = widened<Held<C<Quad>, B>, S>(make<C<S>>(B{}, exact_b[i]));
     const auto wide = Op::template run<C<Quad>>(wide_a, wide_b);
     using Wide = std::remove_cv_t<decltype(wide)>;
     const Values truth = values(C<Quad>::exact(typename Op::Result{}, wide));
-    const Values found = values(C<Quad>::exact(typename Op::Result{}, widened<Wide, S>(result)));
-    const Values generated = reference<Op>(exact_a, exact_b);
+    const Values found =
+        values(C<Quad>::exact(typename Op::Result{}, widened<Wide, S>(results[i])));
+    const Values generated = reference<Op>(exact_a[i], exact_b[i]);
     const double error = relative_difference(found, truth);
     const double disagree = relative_difference(truth, generated);
     if (!(error <= worst.error)) worst.error = error;
     if (!(disagree <= worst.disagree)) worst.disagree = disagree;
   }
   return worst;
+}
+
+/// An element rounded to numbers, the same in every lane where S has several.
+template <class S, class Element>
+[[nodiscard]] auto rounded(const Element& x) {
+  return x.template cast<hamotor::scalar::NumberOf<S>>().template cast<S>();
 }
 
 /// The first number that a thing holds.
@@ -423,6 +486,16 @@ template <class C, class Kind, std::uint64_t seed>
   return all;
 }
 
+/// The same, in lanes.
+template <template <class> class C, class S, class Kind, std::uint64_t seed>
+[[nodiscard]] std::vector<Held<C<Lanes<S>>, Kind>> sample_in_lanes(std::size_t count) {
+  std::vector<Held<C<Lanes<S>>, Kind>> all;
+  const auto& exact = exact_sample<Kind, seed>();
+  for (std::size_t i = 0; i < count; i += Lanes<S>::lanes)
+    all.push_back(in_lanes<C, S>(Kind{}, &exact[i]));
+  return all;
+}
+
 /// Time an operation takes when its second operand is the result of the one before; where result
 /// and operand are of different kinds, one number of it is (times 0).  The first operand is another
 /// one every time.  Chains begin anew from the same start after 256 operations.
@@ -457,49 +530,79 @@ void latency(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<std::int64_t>(length) * state.iterations());
 }
 
-/// Time an operation takes over arrays of operands and results.
-template <template <class> class C, class S, class Op>
-void throughput(benchmark::State& state) {
-  using A = Held<C<S>, typename Op::A>;
-  using B = Held<C<S>, typename Op::B>;
-  const auto length = static_cast<std::size_t>(state.range(0));
-  const auto a = sample<C<S>, typename Op::A, 0>(length);
-  const auto b = sample<C<S>, typename Op::B, 1>(length);
-  std::vector<std::remove_cv_t<decltype(Op::template run<C<S>>(a[0], b[0]))>> result;
-  for (std::size_t i = 0; i < length; ++i) result.push_back(Op::template run<C<S>>(a[i], b[i]));
+/// Time operations take over arrays of operands and results: how many times over, it says itself.
+template <class C, class Op>
+void over_arrays(benchmark::State& state, const std::vector<Held<C, typename Op::A>>& a,
+                 const std::vector<Held<C, typename Op::B>>& b) {
+  std::vector<Given<C, Op>> result;
+  for (std::size_t i = 0; i < a.size(); ++i) result.push_back(Op::template run<C>(a[i], b[i]));
   for (auto _ : state) {
-    const A* const left = a.data();
-    const B* const right = b.data();
+    const auto* const left = a.data();
+    const auto* const right = b.data();
     auto* const out = result.data();
     benchmark::DoNotOptimize(left);
     benchmark::DoNotOptimize(right);
     benchmark::DoNotOptimize(out);
-    for (std::size_t i = 0; i < length; ++i) out[i] = Op::template run<C<S>>(left[i], right[i]);
+    for (std::size_t i = 0; i < a.size(); ++i) out[i] = Op::template run<C>(left[i], right[i]);
     benchmark::ClobberMemory();
   }
-  state.SetItemsProcessed(static_cast<std::int64_t>(length) * state.iterations());
+  state.SetItemsProcessed(state.range(0) * state.iterations());
+}
+
+/// Arrays of structures: each thing by itself.
+template <template <class> class C, class S, class Op>
+void throughput(benchmark::State& state) {
+  const auto length = static_cast<std::size_t>(state.range(0));
+  over_arrays<C<S>, Op>(state, sample<C<S>, typename Op::A, 0>(length),
+                        sample<C<S>, typename Op::B, 1>(length));
+}
+
+/// Structures of arrays in blocks: as many things at once as a register has numbers.
+template <template <class> class C, class S, class Op>
+void throughput_in_lanes(benchmark::State& state) {
+  const auto length = static_cast<std::size_t>(state.range(0));
+  over_arrays<C<Lanes<S>>, Op>(state, sample_in_lanes<C, S, typename Op::A, 0>(length),
+                               sample_in_lanes<C, S, typename Op::B, 1>(length));
 }
 
 /// Where measured errors go: a JSON object a line.
 using ErrorReport = void (*)(std::FILE*);
 std::vector<ErrorReport>& error_reports();
 
+/// What a contestant is called where it takes arrays in lanes; nullptr: it does not.
+template <template <class> class C>
+inline constexpr const char* name_in_lanes = nullptr;
+
+template <template <class> class C, class S, class Op, bool in_packs>
+void report_errors(std::FILE* file) {
+  const Measured worst = measure<C, S, Op, in_packs>();
+  std::fprintf(file,
+               R"({"operation": "%s", "contestant": "%s", "scalar": "%s", )"
+               R"("max_relative_error": %.4g, "disagreement": %.4g})"
+               "\n",
+               Op::name, in_packs ? name_in_lanes<C> : C<S>::name,
+               std::is_same_v<S, float> ? "float" : "double", worst.error, worst.disagree);
+}
+
 template <template <class> class C, class S, class Op>
 void enter_one(const char* scalar) {
-  const std::string name = std::string(Op::name) + "|" + C<S>::name + "|" + scalar + "|";
-  benchmark::RegisterBenchmark((name + "latency").c_str(), &latency<C, S, Op>);
-  benchmark::RegisterBenchmark((name + "array").c_str(), &throughput<C, S, Op>)
+  const auto called = [&](const char* contestant, const char* mode) {
+    return std::string(Op::name) + "|" + contestant + "|" + scalar + "|" + mode;
+  };
+  benchmark::RegisterBenchmark(called(C<S>::name, "latency").c_str(), &latency<C, S, Op>);
+  benchmark::RegisterBenchmark(called(C<S>::name, "array").c_str(), &throughput<C, S, Op>)
       ->Arg(256)
-      ->Arg(4096);
-  error_reports().push_back([](std::FILE* file) {
-    const Measured worst = measure<C, S, Op>();
-    std::fprintf(file,
-                 R"({"operation": "%s", "contestant": "%s", "scalar": "%s", )"
-                 R"("max_relative_error": %.4g, "disagreement": %.4g})"
-                 "\n",
-                 Op::name, C<S>::name, std::is_same_v<S, float> ? "float" : "double", worst.error,
-                 worst.disagree);
-  });
+      ->Arg(longest);
+  error_reports().push_back(&report_errors<C, S, Op, false>);
+#ifndef HAMOTOR_BENCH_BRIEF
+  if constexpr (name_in_lanes<C> != nullptr) {
+    benchmark::RegisterBenchmark(called(name_in_lanes<C>, "array").c_str(),
+                                 &throughput_in_lanes<C, S, Op>)
+        ->Arg(256)
+        ->Arg(longest);
+    error_reports().push_back(&report_errors<C, S, Op, true>);
+  }
+#endif
 }
 
 /// Whether a contestant can hold an operation's operands and do it.

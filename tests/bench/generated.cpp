@@ -14,14 +14,14 @@ struct Generated {
 
   template <class Kind>
   [[nodiscard]] static auto make(Kind, const typename Kind::Exact& x) {
-    return x.template cast<S>();
+    return rounded<S>(x);
   }
   template <class Kind>
   [[nodiscard]] static auto make(kind::MatrixOn<Kind> kind, const pga3::Motor<Quad>& m) {
-    return matrix(kind, m).template cast<S>();
+    return rounded<S>(matrix(kind, m));
   }
   [[nodiscard]] static Body<S> make(kind::Body, const Body<Quad>& x) {
-    return {x.motion.template cast<S>(), x.momentum.template cast<S>()};
+    return {rounded<S>(x.motion), rounded<S>(x.momentum)};
   }
   template <class Kind>
   [[nodiscard]] static auto exact(Kind, const auto& x) {
@@ -104,6 +104,9 @@ struct Generated {
     return stepped<hamotor::Splitting2<System>>(body);
   }
 };
+
+template <>
+inline constexpr const char* name_in_lanes<Generated> = "generated, packs";
 
 /// The matrix of a motor, made anew by each operation.
 template <class S>

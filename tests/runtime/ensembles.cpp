@@ -274,46 +274,6 @@ TEST(Packs, a_product_is_taken_away_with_the_rounding_of_a_number) {
   expect_a_number_s_less_product<float, 4>();
 }
 
-template <std::size_t W>
-void expect_logarithms_of_lanes_as_alone(const std::vector<hamotor::pga3::Motor<double>>& motors) {
-  using Lanes = Pack<double, W>;
-  for (std::size_t first = 0; first < motors.size(); ++first) {
-    hamotor::pga3::Motor<Lanes> together{};
-    for (std::size_t lane = 0; lane < W; ++lane) {
-      auto components = together.components();
-      const auto alone = motors[(first + lane) % motors.size()].components();
-      for (std::size_t i = 0; i < alone.size(); ++i) components[i].set(lane, alone[i]);
-      together = hamotor::pga3::Motor<Lanes>::from(components);
-    }
-    const auto found = log(together).components();
-    for (std::size_t lane = 0; lane < W; ++lane) {
-      const auto alone = log(motors[(first + lane) % motors.size()]).components();
-      for (std::size_t i = 0; i < alone.size(); ++i) {
-        EXPECT_EQ(std::bit_cast<std::uint64_t>(double{found[i][lane]}),
-                  std::bit_cast<std::uint64_t>(alone[i]))
-            << first << ' ' << lane;
-      }
-    }
-  }
-}
-
-// Some by the shortcut, some not: alone, together and mixed.
-TEST(Packs, logarithms_of_lanes_have_the_bits_of_one_alone) {
-  using Motor = hamotor::pga3::Motor<double>;
-  using Bivector = hamotor::pga3::Bivector<double>;
-  const auto near = exp(Bivector{0.3, -0.2, 0.5, 1, 2, -3});
-  const auto far = exp(Bivector{1.5, -0.2, 1.9, 1, 2, -3});
-  const Motor moved{1, 0, 0, 0, 4, 5, 6, 0};
-  std::vector<Motor> motors{near, near, near, near, near, near, near, near, near};
-  for (const Motor& m : {far, -moved, near, 3.0 * near, moved, 1e100 * near, Motor::identity(),
-                         near, far, far, far, far, far, far, far, far, near}) {
-    motors.push_back(m);
-  }
-  expect_logarithms_of_lanes_as_alone<1>(motors);
-  expect_logarithms_of_lanes_as_alone<4>(motors);
-  expect_logarithms_of_lanes_as_alone<8>(motors);
-}
-
 TEST(Packs, masks_choose_lane_by_lane) {
   Pack<double, 4> x(2);
   x.set(1, -1);

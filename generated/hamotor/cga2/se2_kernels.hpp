@@ -164,7 +164,7 @@ template <class S>
     const S square = select(m.s > S(0), scalar::fma(-m.s, m.s, S(1)), m.e12 * m.e12);
     const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
     const S scaled = S(2) * stretch;
-    return {.w12 = -(scaled * m.e12), .v1 = -(scaled * m.e1i), .v2 = -(scaled * m.e2i)};
+    return {.w12 = -scaled * m.e12, .v1 = -scaled * m.e1i, .v2 = -scaled * m.e2i};
   };
   if (scalar::everywhere(usual)) [[likely]] {
     return shortly();

@@ -2320,7 +2320,7 @@ template <class S>
   const S inverse_b_e23 = select(diagonal > S(0), -inverse_rest_e23, -right_e23);
   return {.s = S(0.5) * (inverse_a_s + inverse_b_s),
           .e23 = S(0.5) * (inverse_a_e23 + inverse_b_e23),
-          .e31 = -(S(0.5) * (inverse_a_e13 + inverse_b_e13)),
+          .e31 = S(-0.5) * (inverse_a_e13 + inverse_b_e13),
           .e12 = S(0.5) * (inverse_a_e12 + inverse_b_e12),
           .e1i = S(0.5) * select(diagonal > S(0), -lower_e23, first_e23),
           .e2i = S(0.5) * select(diagonal > S(0), lower_e13, -first_e13),
@@ -2328,7 +2328,7 @@ template <class S>
           .e123i = S(0.5) * select(diagonal > S(0), lower_s, -first_s),
           .e0i = S(-0.5) * (inverse_a_s - inverse_b_s),
           .e023i = S(-0.5) * (inverse_a_e23 - inverse_b_e23),
-          .e031i = -(S(-0.5) * (inverse_a_e13 - inverse_b_e13)),
+          .e031i = S(0.5) * (inverse_a_e13 - inverse_b_e13),
           .e012i = S(-0.5) * (inverse_a_e12 - inverse_b_e12),
           .e01 = select(diagonal > S(0), -right_e23, -inverse_rest_e23),
           .e02 = select(diagonal > S(0), right_e13, inverse_rest_e13),
@@ -2399,7 +2399,7 @@ template <class S>
   const S turn_e012i = inverse * m.e012i;
   return {.s = S(0.5) * root,
           .e23 = dot(factor, m.e23, per_root, -m.e0i * turn_e023i),
-          .e31 = -dot(factor, -m.e31, per_root, m.e0i * turn_e013i),
+          .e31 = dot(factor, m.e31, -per_root, m.e0i * turn_e013i),
           .e12 = dot(factor, m.e12, per_root, -m.e0i * turn_e012i),
           .e1i = dot(factor, m.e1i, per_root,
                      dot(m.e23, turn_e123i, -m.e2i, turn_e012i, m.e3i, turn_e013i)),
@@ -2477,8 +2477,8 @@ template <class S>
   return {.s = S(0.5) * root,
           .e23 = dot(factor, m.e23, per_root,
                      dot(m.e1i, turn_e0123, -m.e0i, turn_e023i, m.e01, turn_e123i)),
-          .e31 = -dot(factor, -m.e31, per_root,
-                      dot(-m.e2i, turn_e0123, m.e0i, turn_e013i, -m.e02, turn_e123i)),
+          .e31 = dot(factor, m.e31, -per_root,
+                     dot(-m.e2i, turn_e0123, m.e0i, turn_e013i, -m.e02, turn_e123i)),
           .e12 = dot(factor, m.e12, per_root,
                      dot(m.e3i, turn_e0123, -m.e0i, turn_e012i, m.e03, turn_e123i)),
           .e1i = dot(factor, m.e1i, per_root,
@@ -2565,7 +2565,7 @@ template <class S>
   const S twisted = S(2) * e.twisted;
   return {.s = e.number,
           .e23 = dot(e.bivector, b.e23, twisted, t_e23),
-          .e31 = -dot(e.bivector, -b.e31, twisted, t_e13),
+          .e31 = dot(e.bivector, b.e31, -twisted, t_e13),
           .e12 = dot(e.bivector, b.e12, twisted, t_e12),
           .e1i = dot(e.bivector, b.e1i, twisted, t_e1i),
           .e2i = dot(e.bivector, b.e2i, twisted, t_e2i),
@@ -2573,7 +2573,7 @@ template <class S>
           .e123i = quad * w_e123i,
           .e0i = dot(e.bivector, b.e0i, twisted, t_e0i),
           .e023i = quad * w_e023i,
-          .e031i = -(quad * w_e013i),
+          .e031i = -quad * w_e013i,
           .e012i = quad * w_e012i,
           .e01 = dot(e.bivector, b.e01, twisted, -t_e01),
           .e02 = dot(e.bivector, b.e02, twisted, t_e02),
@@ -2609,7 +2609,7 @@ template <class S>
   const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
-          .e31 = -(spin * w_e13),
+          .e31 = -spin * w_e13,
           .e12 = spin * w_e12,
           .e1i = v_scaling.out * dot(sinc, v_e1i, along, -w_e23),
           .e2i = v_scaling.out * dot(sinc, v_e2i, along, w_e13),
@@ -2767,8 +2767,8 @@ template <class S>
   const S away = select(f.turn > S(0), spin / length2, S(0));
   return {.e23 = dot(f.bivector, m.e23, f.twisted, t_e23, spin, y_e23, away,
                      dot(-v_e123i, y_e01, v_e023i, y_e0i, -v_e0123, y_e1i)),
-          .e31 = -dot(f.bivector, -m.e31, f.twisted, t_e13, spin, y_e13, away,
-                      dot(v_e123i, y_e02, v_e013i, y_e0i, v_e0123, y_e2i)),
+          .e31 = dot(f.bivector, m.e31, -f.twisted, t_e13, -spin, y_e13, -away,
+                     dot(v_e123i, y_e02, v_e013i, y_e0i, v_e0123, y_e2i)),
           .e12 = dot(f.bivector, m.e12, f.twisted, t_e12, spin, y_e12, away,
                      dot(-v_e123i, y_e03, v_e012i, y_e0i, -v_e0123, y_e3i)),
           .e1i = dot(f.bivector, m.e1i, f.twisted, t_e1i, spin, y_e1i, away,
@@ -2856,7 +2856,7 @@ template <class S>
                       mul_add(-square, square, S(1)) + S(4) * omega) *
                inverse,
           .e23 = dot(linear, b.e23, even, t_e23),
-          .e31 = -dot(linear, -b.e31, even, t_e13),
+          .e31 = dot(linear, b.e31, -even, t_e13),
           .e12 = dot(linear, b.e12, even, t_e12),
           .e1i = dot(linear, b.e1i, even, t_e1i),
           .e2i = dot(linear, b.e2i, even, t_e2i),
@@ -2864,7 +2864,7 @@ template <class S>
           .e123i = even * w_e123i,
           .e0i = dot(linear, b.e0i, even, t_e0i),
           .e023i = even * w_e023i,
-          .e031i = -(even * w_e013i),
+          .e031i = -even * w_e013i,
           .e012i = even * w_e012i,
           .e01 = dot(linear, b.e01, even, -t_e01),
           .e02 = dot(linear, b.e02, even, t_e02),
@@ -2940,7 +2940,7 @@ template <class S>
   const S linear = shifted * inverse;
   return {
       .e23 = dot(linear, m.e23, inverse, dot(m.e0123, m.e1i, -m.e023i, m.e0i, m.e01, m.e123i)),
-      .e31 = -dot(linear, -m.e31, inverse, dot(-m.e0123, m.e2i, m.e031i, m.e0i, -m.e02, m.e123i)),
+      .e31 = dot(linear, m.e31, -inverse, dot(-m.e0123, m.e2i, m.e031i, m.e0i, -m.e02, m.e123i)),
       .e12 = dot(linear, m.e12, inverse, dot(m.e0123, m.e3i, -m.e012i, m.e0i, m.e03, m.e123i)),
       .e1i = dot(linear, m.e1i, inverse, dot(m.e123i, m.e23, -m.e012i, m.e2i, m.e031i, m.e3i)),
       .e2i = dot(linear, m.e2i, inverse, dot(m.e123i, m.e31, m.e012i, m.e1i, -m.e023i, m.e3i)),
@@ -2983,8 +2983,8 @@ template <class S>
       .e23 = dot(factor, m.e23, slip,
                  dot(-m.e1i, q_e0123, m.e0i, q_e023i, -m.e031i, q_e012i, -m.e012i, q_e013i, -m.e01,
                      q_e123i)),
-      .e31 = -dot(
-          factor, -m.e31, slip,
+      .e31 = dot(
+          factor, m.e31, -slip,
           dot(m.e2i, q_e0123, m.e0i, q_e013i, -m.e023i, q_e012i, m.e012i, q_e023i, m.e02, q_e123i)),
       .e12 = dot(factor, m.e12, slip,
                  dot(-m.e3i, q_e0123, m.e0i, q_e012i, m.e023i, q_e013i, m.e031i, q_e023i, -m.e03,
@@ -3008,8 +3008,8 @@ template <class S>
           dot(factor, m.e023i, slip,
               dot(m.s, q_e023i, -m.e31, q_e012i, -m.e12, q_e013i, -m.e1i, q_e0123, m.e01, q_e123i)),
       .e031i =
-          -dot(factor, -m.e031i, slip,
-               dot(m.s, q_e013i, -m.e23, q_e012i, m.e12, q_e023i, m.e2i, q_e0123, -m.e02, q_e123i)),
+          dot(factor, m.e031i, -slip,
+              dot(m.s, q_e013i, -m.e23, q_e012i, m.e12, q_e023i, m.e2i, q_e0123, -m.e02, q_e123i)),
       .e012i =
           dot(factor, m.e012i, slip,
               dot(m.s, q_e012i, m.e23, q_e013i, m.e31, q_e023i, -m.e3i, q_e0123, m.e03, q_e123i)),
@@ -3048,7 +3048,7 @@ template <class S>
   return {
       .s = dot(factor, m.s, slip, dot(-m.e023i, q_e023i, m.e031i, q_e013i, -m.e012i, q_e012i)),
       .e23 = dot(factor, m.e23, slip, dot(m.e0i, q_e023i, -m.e031i, q_e012i, -m.e012i, q_e013i)),
-      .e31 = -dot(factor, -m.e31, slip, dot(m.e0i, q_e013i, -m.e023i, q_e012i, m.e012i, q_e023i)),
+      .e31 = dot(factor, m.e31, -slip, dot(m.e0i, q_e013i, -m.e023i, q_e012i, m.e012i, q_e023i)),
       .e12 = dot(factor, m.e12, slip, dot(m.e0i, q_e012i, m.e023i, q_e013i, m.e031i, q_e023i)),
       .e1i = dot(factor, m.e1i, slip,
                  dot(-m.e23, q_e123i, m.e2i, q_e012i, m.e3i, q_e013i, m.e123i, q_e023i, -m.e023i,
@@ -3064,7 +3064,7 @@ template <class S>
               dot(m.s, q_e123i, -m.e1i, q_e023i, m.e2i, q_e013i, -m.e3i, q_e012i, m.e0i, q_e123i)),
       .e0i = dot(factor, m.e0i, slip, dot(-m.e23, q_e023i, m.e31, q_e013i, -m.e12, q_e012i)),
       .e023i = dot(factor, m.e023i, slip, dot(m.s, q_e023i, -m.e31, q_e012i, -m.e12, q_e013i)),
-      .e031i = -dot(factor, -m.e031i, slip, dot(m.s, q_e013i, -m.e23, q_e012i, m.e12, q_e023i)),
+      .e031i = dot(factor, m.e031i, -slip, dot(m.s, q_e013i, -m.e23, q_e012i, m.e12, q_e023i)),
       .e012i = dot(factor, m.e012i, slip, dot(m.s, q_e012i, m.e23, q_e013i, m.e31, q_e023i))};
 }
 
@@ -3091,7 +3091,7 @@ template <class S>
   const S factor = inverse * root;
   return {.s = inverse * r_s,
           .e23 = inverse * r_e23,
-          .e31 = -(inverse * r_e13),
+          .e31 = -inverse * r_e13,
           .e12 = inverse * r_e12,
           .e1i = mul_add(-slip, -r_e23, q_e1i) * root * factor,
           .e2i = mul_add(-slip, r_e13, q_e2i) * root * factor,
@@ -3112,10 +3112,8 @@ template <class S>
   const S r_e23 = r_scaling.in * r.e23;
   const S square = dot(r_s, r_s, r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
   const S inverse = S(1) / scalar::sqrt(square);
-  return {.s = inverse * r_s,
-          .e23 = inverse * r_e23,
-          .e31 = -(inverse * r_e13),
-          .e12 = inverse * r_e12};
+  return {
+      .s = inverse * r_s, .e23 = inverse * r_e23, .e31 = -inverse * r_e13, .e12 = inverse * r_e12};
 }
 
 /// unit_defect: Motor -> MotorDefect

@@ -241,7 +241,7 @@ template <class S>
   const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
-          .e31 = -(spin * w_e13),
+          .e31 = -spin * w_e13,
           .e12 = spin * w_e12,
           .e1i = v_scaling.out * dot(sinc, v_e1i, along, -w_e23),
           .e2i = v_scaling.out * dot(sinc, v_e2i, along, w_e13),
@@ -275,12 +275,12 @@ template <class S>
     const S scaled = S(2) * stretch;
     const S along =
         select(square > S(0), S(2) * mul_add(stretch, m.s, S(-1)) * (m.e123i * inverse), S(0));
-    return {.w23 = -(scaled * m.e23),
+    return {.w23 = -scaled * m.e23,
             .w31 = scaled * -m.e31,
-            .w12 = -(scaled * m.e12),
-            .v1 = -dot(scaled, m.e1i, along, -m.e23),
-            .v2 = -dot(scaled, m.e2i, along, -m.e31),
-            .v3 = -dot(scaled, m.e3i, along, -m.e12)};
+            .w12 = -scaled * m.e12,
+            .v1 = dot(-scaled, m.e1i, along, m.e23),
+            .v2 = dot(-scaled, m.e2i, along, m.e31),
+            .v3 = dot(-scaled, m.e3i, along, m.e12)};
   };
   if (scalar::everywhere(usual)) [[likely]] {
     return shortly();
@@ -376,7 +376,7 @@ template <class S>
   return {
       .s = dot(r_scaling.in, r_scaling.in, -r_e12, r_e12, -r_e13, r_e13, -r_e23, r_e23) * inverse,
       .e23 = factor * r_e23,
-      .e31 = -(factor * r_e13),
+      .e31 = -factor * r_e13,
       .e12 = factor * r_e12,
       .e1i = twice * dot(q_e1i, pitch, -r_e23, pitch_low, -r_e23) * root * root,
       .e2i = twice * dot(q_e2i, pitch, r_e13, pitch_low, r_e13) * root * root,

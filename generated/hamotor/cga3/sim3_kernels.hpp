@@ -272,7 +272,7 @@ template <class S>
   return {
       .s = e.number,
       .e23 = dot(e.bivector, b_e23, twisted, b_e0i * w_e023i),
-      .e31 = -dot(e.bivector, b_e13, twisted, b_e0i * w_e013i),
+      .e31 = dot(-e.bivector, b_e13, -twisted, b_e0i * w_e013i),
       .e12 = dot(e.bivector, b_e12, twisted, b_e0i * w_e012i),
       .e1i = dot(e.bivector, b_e1i, twisted, dot(-b_e23, w_e123i, b_e2i, w_e012i, b_e3i, w_e013i)),
       .e2i = dot(e.bivector, b_e2i, twisted, dot(b_e13, w_e123i, -b_e1i, w_e012i, b_e3i, w_e023i)),
@@ -282,7 +282,7 @@ template <class S>
       .e0i =
           dot(e.bivector, b_e0i, twisted, dot(-b_e12, w_e012i, -b_e13, w_e013i, -b_e23, w_e023i)),
       .e023i = quad * w_e023i,
-      .e031i = -(quad * w_e013i),
+      .e031i = -quad * w_e013i,
       .e012i = quad * w_e012i};
 }
 
@@ -357,7 +357,7 @@ template <class S>
   const S even = S(2) * twice;
   return {.s = (mul_add(-square, square, S(1)) + S(4) * -omega) * inverse,
           .e23 = dot(linear, b_e23, even, b_e0i * w_e023i),
-          .e31 = -dot(linear, b_e13, even, b_e0i * w_e013i),
+          .e31 = dot(-linear, b_e13, -even, b_e0i * w_e013i),
           .e12 = dot(linear, b_e12, even, b_e0i * w_e012i),
           .e1i = dot(linear, b_e1i, even, dot(-b_e23, w_e123i, b_e2i, w_e012i, b_e3i, w_e013i)),
           .e2i = dot(linear, b_e2i, even, dot(b_e13, w_e123i, -b_e1i, w_e012i, b_e3i, w_e023i)),
@@ -365,7 +365,7 @@ template <class S>
           .e123i = even * w_e123i,
           .e0i = dot(linear, b_e0i, even, dot(-b_e12, w_e012i, -b_e13, w_e013i, -b_e23, w_e023i)),
           .e023i = even * w_e023i,
-          .e031i = -(even * w_e013i),
+          .e031i = -even * w_e013i,
           .e012i = even * w_e012i};
 }
 

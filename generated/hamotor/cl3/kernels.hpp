@@ -480,7 +480,7 @@ template <class S>
   const S square = dot(a.s, a.s, a.e23, a.e23, a.e31, a.e31, a.e12, a.e12);
   const S factor = S(1) / square;
   return {
-      .s = factor * a.s, .e23 = factor * -a.e23, .e31 = -(factor * a.e31), .e12 = factor * -a.e12};
+      .s = factor * a.s, .e23 = factor * -a.e23, .e31 = -factor * a.e31, .e12 = factor * -a.e12};
 }
 
 /// inverse: Vector -> Vector
@@ -524,7 +524,7 @@ template <class S>
   const auto turn = scalar::sin_cos(angle);
   const S length = root.hi + root.lo;
   const S spin = select(length > S(0), turn.sin / length, S(0));
-  return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -(spin * w_e13), .e12 = spin * w_e12};
+  return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -spin * w_e13, .e12 = spin * w_e12};
 }
 
 /// exp_lean: Bivector -> Rotor
@@ -577,7 +577,7 @@ template <class S>
     const S stretch = select(length > S(0), select(r.s > S(0), angle / sine, angle / length), S(0));
     const S half_turn = select(-r.s > S(0), scalar::pi<S>(), S(0));
     return {.e23 = stretch * select(r.s > S(0), r.e23, r_e23),
-            .e31 = -(stretch * select(r.s > S(0), -r.e31, r_e13)),
+            .e31 = -stretch * select(r.s > S(0), -r.e31, r_e13),
             .e12 = select(length > S(0), stretch * select(r.s > S(0), r.e12, r_e12), half_turn)};
   });
 }
@@ -612,7 +612,7 @@ template <class S>
   return {
       .s = dot(r_scaling.in, r_scaling.in, -r_e12, r_e12, -r_e13, r_e13, -r_e23, r_e23) * inverse,
       .e23 = factor * r_e23,
-      .e31 = -(factor * r_e13),
+      .e31 = -factor * r_e13,
       .e12 = factor * r_e12};
 }
 
@@ -648,7 +648,7 @@ template <class S>
   const S inverse = select(r.s > S(0), S(1) / (S(1) + r.s), (S(1) - r.s) / squares.hi);
   const S size = select(r.s > S(0), r_scaling.out, r_scaling.in);
   return {.e23 = inverse * r_e23 * size,
-          .e31 = -(inverse * r_e13 * size),
+          .e31 = -(inverse * r_e13) * size,
           .e12 = inverse * r_e12 * size};
 }
 
@@ -678,10 +678,8 @@ template <class S>
   const S r_e23 = r_scaling.in * r.e23;
   const S square = dot(r_s, r_s, r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
   const S inverse = S(1) / scalar::sqrt(square);
-  return {.s = inverse * r_s,
-          .e23 = inverse * r_e23,
-          .e31 = -(inverse * r_e13),
-          .e12 = inverse * r_e12};
+  return {
+      .s = inverse * r_s, .e23 = inverse * r_e23, .e31 = -inverse * r_e13, .e12 = inverse * r_e12};
 }
 
 /// normalize_lean: Rotor -> Rotor

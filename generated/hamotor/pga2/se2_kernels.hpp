@@ -177,7 +177,7 @@ template <class S>
     const S square = select(m.s > S(0), scalar::fma(-m.s, m.s, S(1)), m.e12 * m.e12);
     const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
     const S scaled = S(2) * stretch;
-    return {.w12 = -(scaled * m.e12), .v1 = -(scaled * m.e01), .v2 = -(scaled * m.e02)};
+    return {.w12 = -scaled * m.e12, .v1 = -scaled * m.e01, .v2 = -scaled * m.e02};
   };
   if (scalar::everywhere(usual)) [[likely]] {
     return shortly();
@@ -268,7 +268,7 @@ template <class S>
   const S square = scalar::fma(-m.s, m.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(m.s) / scalar::sqrt(square), S(1));
   const S scaled = S(2) * stretch;
-  return {.w12 = -(scaled * m.e12), .v1 = -(scaled * m.e01), .v2 = -(scaled * m.e02)};
+  return {.w12 = -scaled * m.e12, .v1 = -scaled * m.e01, .v2 = -scaled * m.e02};
 }
 
 /// cayley_lean: Rate -> Motor

@@ -1336,7 +1336,7 @@ template <class S>
   const S turn = slip * q_e0123;
   return {.s = factor * a.s,
           .e23 = factor * -a.e23,
-          .e31 = -(factor * a.e31),
+          .e31 = -factor * a.e31,
           .e12 = factor * -a.e12,
           .e01 = dot(factor, -a.e01, turn, a.e23),
           .e02 = dot(factor, -a.e02, turn, a.e31),
@@ -1361,9 +1361,9 @@ template <class S>
           .e2 = factor * u.e2,
           .e3 = factor * u.e3,
           .e123 = factor * -u.e123,
-          .e032 = -dot(factor, u.e032, turn, -u.e1),
+          .e032 = dot(-factor, u.e032, turn, u.e1),
           .e013 = dot(factor, -u.e013, turn, u.e2),
-          .e021 = -dot(factor, u.e021, turn, -u.e3)};
+          .e021 = dot(-factor, u.e021, turn, u.e3)};
 }
 
 /// inverse: Plane -> Plane
@@ -1391,7 +1391,7 @@ template <class S>
   const S turn = slip * -q_e0123;
   return {.s = S(0),
           .e23 = factor * -b.e23,
-          .e31 = -(factor * b.e31),
+          .e31 = -factor * b.e31,
           .e12 = factor * -b.e12,
           .e01 = dot(factor, -b.e01, turn, b.e23),
           .e02 = dot(factor, -b.e02, turn, b.e31),
@@ -1463,7 +1463,7 @@ template <class S>
   const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
-          .e31 = -(spin * w_e13),
+          .e31 = -spin * w_e13,
           .e12 = spin * w_e12,
           .e01 = v_scaling.out * dot(sinc, v_e01, along, -w_e23),
           .e02 = v_scaling.out * dot(sinc, v_e02, along, w_e13),
@@ -1630,7 +1630,7 @@ template <class S>
   return {
       .s = dot(r_scaling.in, r_scaling.in, -r_e12, r_e12, -r_e13, r_e13, -r_e23, r_e23) * inverse,
       .e23 = factor * r_e23,
-      .e31 = -(factor * r_e13),
+      .e31 = -factor * r_e13,
       .e12 = factor * r_e12,
       .e01 = twice * dot(q_e01, pitch, -r_e23, pitch_low, -r_e23) * root * root,
       .e02 = twice * dot(q_e02, pitch, r_e13, pitch_low, r_e13) * root * root,
@@ -1690,7 +1690,7 @@ template <class S>
   const S inward = select(m.s > S(0), S(1), r_scaling.in);
   return {
       .e23 = inverse * r_e23 * size,
-      .e31 = -(inverse * r_e13 * size),
+      .e31 = -(inverse * r_e13) * size,
       .e12 = inverse * r_e12 * size,
       .e01 = scalar::compensated_dot(-r_e23, along, -r_e23, share, -r_e23, share_low, q_e01, S(1)) *
              root * inverse * inward * root,
@@ -1742,7 +1742,7 @@ template <class S>
   const S factor = inverse * root;
   return {.s = inverse * r_s,
           .e23 = inverse * r_e23,
-          .e31 = -(inverse * r_e13),
+          .e31 = -inverse * r_e13,
           .e12 = inverse * r_e12,
           .e01 = mul_add(-slip, -r_e23, q_e01) * root * factor,
           .e02 = mul_add(-slip, r_e13, q_e02) * root * factor,
@@ -1763,10 +1763,8 @@ template <class S>
   const S r_e23 = r_scaling.in * r.e23;
   const S square = dot(r_s, r_s, r_e12, r_e12, r_e13, r_e13, r_e23, r_e23);
   const S inverse = S(1) / scalar::sqrt(square);
-  return {.s = inverse * r_s,
-          .e23 = inverse * r_e23,
-          .e31 = -(inverse * r_e13),
-          .e12 = inverse * r_e12};
+  return {
+      .s = inverse * r_s, .e23 = inverse * r_e23, .e31 = -inverse * r_e13, .e12 = inverse * r_e12};
 }
 
 /// normalize_lean: Motor -> Motor

@@ -262,7 +262,7 @@ template <class S>
   const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
   return {.s = turn.cos,
           .e23 = spin * w_e23,
-          .e31 = -(spin * w_e13),
+          .e31 = -spin * w_e13,
           .e12 = spin * w_e12,
           .e01 = v_scaling.out * dot(sinc, v_e01, along, -w_e23),
           .e02 = v_scaling.out * dot(sinc, v_e02, along, w_e13),
@@ -296,12 +296,12 @@ template <class S>
     const S scaled = S(2) * stretch;
     const S along =
         select(square > S(0), S(2) * mul_add(stretch, m.s, S(-1)) * (m.e0123 * inverse), S(0));
-    return {.w23 = -(scaled * m.e23),
+    return {.w23 = -scaled * m.e23,
             .w31 = scaled * -m.e31,
-            .w12 = -(scaled * m.e12),
-            .v1 = -dot(scaled, m.e01, along, -m.e23),
-            .v2 = -dot(scaled, m.e02, along, -m.e31),
-            .v3 = -dot(scaled, m.e03, along, -m.e12)};
+            .w12 = -scaled * m.e12,
+            .v1 = dot(-scaled, m.e01, along, m.e23),
+            .v2 = dot(-scaled, m.e02, along, m.e31),
+            .v3 = dot(-scaled, m.e03, along, m.e12)};
   };
   if (scalar::everywhere(usual)) [[likely]] {
     return shortly();
@@ -397,7 +397,7 @@ template <class S>
   return {
       .s = dot(r_scaling.in, r_scaling.in, -r_e12, r_e12, -r_e13, r_e13, -r_e23, r_e23) * inverse,
       .e23 = factor * r_e23,
-      .e31 = -(factor * r_e13),
+      .e31 = -factor * r_e13,
       .e12 = factor * r_e12,
       .e01 = twice * dot(q_e01, pitch, -r_e23, pitch_low, -r_e23) * root * root,
       .e02 = twice * dot(q_e02, pitch, r_e13, pitch_low, r_e13) * root * root,
@@ -463,7 +463,7 @@ template <class S>
   const S along = select(square > S(0), mul_add(S(-0.5), cosine, spin) * product / square, S(0));
   return {.s = cosine,
           .e23 = spin * -w.w23,
-          .e31 = -(spin * w.w31),
+          .e31 = -spin * w.w31,
           .e12 = spin * -w.w12,
           .e01 = dot(spin, -w.v1, along, w.w23),
           .e02 = dot(spin, -w.v2, along, w.w31),
@@ -484,12 +484,12 @@ template <class S>
   const S scaled = S(2) * stretch;
   const S along =
       select(square > S(0), S(2) * mul_add(stretch, m.s, S(-1)) * (m.e0123 * inverse), S(0));
-  return {.w23 = -(scaled * m.e23),
+  return {.w23 = -scaled * m.e23,
           .w31 = scaled * -m.e31,
-          .w12 = -(scaled * m.e12),
-          .v1 = -dot(scaled, m.e01, along, -m.e23),
-          .v2 = -dot(scaled, m.e02, along, -m.e31),
-          .v3 = -dot(scaled, m.e03, along, -m.e12)};
+          .w12 = -scaled * m.e12,
+          .v1 = dot(-scaled, m.e01, along, m.e23),
+          .v2 = dot(-scaled, m.e02, along, m.e31),
+          .v3 = dot(-scaled, m.e03, along, m.e12)};
 }
 
 /// cayley_lean: Rate -> Motor
@@ -513,7 +513,7 @@ template <class S>
   const S even = S(2) * (linear * inverse);
   return {.s = (S(1) - square) * inverse,
           .e23 = linear * b_e23,
-          .e31 = -(linear * b_e13),
+          .e31 = -linear * b_e13,
           .e12 = linear * b_e12,
           .e01 = dot(linear, b_e01, even, -b_e23 * w_e0123),
           .e02 = dot(linear, b_e02, even, b_e13 * w_e0123),

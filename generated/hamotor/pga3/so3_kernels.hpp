@@ -169,7 +169,7 @@ template <class S>
   const auto turn = scalar::sin_cos(angle);
   const S length = root.hi + root.lo;
   const S spin = select(length > S(0), turn.sin / length, S(0));
-  return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -(spin * w_e13), .e12 = spin * w_e12};
+  return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -spin * w_e13, .e12 = spin * w_e12};
 }
 
 /// log: Rotor -> Rate
@@ -191,7 +191,7 @@ template <class S>
                             dot(r.e12, r.e12, r.e31, r.e31, r.e23, r.e23));
     const S stretch = select(square > S(0), scalar::acos(r.s) / scalar::sqrt(square), S(1));
     const S scaled = S(2) * stretch;
-    return {.w23 = -(scaled * r.e23), .w31 = scaled * -r.e31, .w12 = -(scaled * r.e12)};
+    return {.w23 = -scaled * r.e23, .w31 = scaled * -r.e31, .w12 = -scaled * r.e12};
   };
   if (scalar::everywhere(usual)) [[likely]] {
     return shortly();
@@ -236,7 +236,7 @@ template <class S>
   return {
       .s = dot(r_scaling.in, r_scaling.in, -r_e12, r_e12, -r_e13, r_e13, -r_e23, r_e23) * inverse,
       .e23 = factor * r_e23,
-      .e31 = -(factor * r_e13),
+      .e31 = -factor * r_e13,
       .e12 = factor * r_e12};
 }
 
@@ -271,7 +271,7 @@ template <class S>
   const S angle = S(0.5) * length;
   const S cosine = scalar::cos(angle);
   const S spin = select(length > S(0), scalar::sin(angle) / length, S(0.5));
-  return {.s = cosine, .e23 = spin * -w.w23, .e31 = -(spin * w.w31), .e12 = spin * -w.w12};
+  return {.s = cosine, .e23 = spin * -w.w23, .e31 = -spin * w.w31, .e12 = spin * -w.w12};
 }
 
 /// log_lean: Rotor -> Rate
@@ -284,7 +284,7 @@ template <class S>
   const S square = scalar::fma(-r.s, r.s, S(1));
   const S stretch = select(square > S(0), scalar::acos(r.s) / scalar::sqrt(square), S(1));
   const S scaled = S(2) * stretch;
-  return {.w23 = -(scaled * r.e23), .w31 = scaled * -r.e31, .w12 = -(scaled * r.e12)};
+  return {.w23 = -scaled * r.e23, .w31 = scaled * -r.e31, .w12 = -scaled * r.e12};
 }
 
 /// cayley_lean: Rate -> Rotor
@@ -303,7 +303,7 @@ template <class S>
   const S linear = S(2) * inverse;
   return {.s = (S(1) - square) * inverse,
           .e23 = linear * b_e23,
-          .e31 = -(linear * b_e13),
+          .e31 = -linear * b_e13,
           .e12 = linear * b_e12};
 }
 

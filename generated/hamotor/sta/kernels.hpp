@@ -510,11 +510,11 @@ template <class S>
   const S turn = slip * q_e0123;
   return {.s = dot(factor, a.s, turn, -a.e0123),
           .e23 = dot(factor, -a.e23, turn, a.e10),
-          .e31 = -dot(factor, a.e31, turn, -a.e20),
+          .e31 = dot(-factor, a.e31, turn, a.e20),
           .e12 = dot(factor, -a.e12, turn, a.e30),
-          .e10 = -dot(factor, a.e10, turn, a.e23),
-          .e20 = -dot(factor, a.e20, turn, a.e31),
-          .e30 = -dot(factor, a.e30, turn, a.e12),
+          .e10 = dot(-factor, a.e10, -turn, a.e23),
+          .e20 = dot(-factor, a.e20, -turn, a.e31),
+          .e30 = dot(-factor, a.e30, -turn, a.e12),
           .e0123 = dot(factor, a.e0123, turn, a.s)};
 }
 
@@ -548,11 +548,11 @@ template <class S>
   const S turn_e0123 = inverse * r.e0123;
   return {.s = S(0.5) * root,
           .e23 = dot(factor, r.e23, per_root, r.e10 * turn_e0123),
-          .e31 = -dot(factor, -r.e31, per_root, -r.e20 * turn_e0123),
+          .e31 = dot(factor, r.e31, -per_root, -r.e20 * turn_e0123),
           .e12 = dot(factor, r.e12, per_root, r.e30 * turn_e0123),
-          .e10 = -dot(factor, -r.e10, per_root, r.e23 * turn_e0123),
-          .e20 = -dot(factor, -r.e20, per_root, r.e31 * turn_e0123),
-          .e30 = -dot(factor, -r.e30, per_root, r.e12 * turn_e0123),
+          .e10 = dot(factor, r.e10, -per_root, r.e23 * turn_e0123),
+          .e20 = dot(factor, r.e20, -per_root, r.e31 * turn_e0123),
+          .e30 = dot(factor, r.e30, -per_root, r.e12 * turn_e0123),
           .e0123 = per_root * r.e0123};
 }
 
@@ -571,11 +571,11 @@ template <class S>
   const S twisted = S(2) * e.twisted;
   return {.s = e.number,
           .e23 = dot(e.bivector, b.e23, twisted, b.e10 * w_e0123),
-          .e31 = -dot(e.bivector, -b.e31, twisted, -b.e20 * w_e0123),
+          .e31 = dot(e.bivector, b.e31, -twisted, -b.e20 * w_e0123),
           .e12 = dot(e.bivector, b.e12, twisted, b.e30 * w_e0123),
-          .e10 = -dot(e.bivector, -b.e10, twisted, b.e23 * w_e0123),
-          .e20 = -dot(e.bivector, -b.e20, twisted, b.e31 * w_e0123),
-          .e30 = -dot(e.bivector, -b.e30, twisted, b.e12 * w_e0123),
+          .e10 = dot(e.bivector, b.e10, -twisted, b.e23 * w_e0123),
+          .e20 = dot(e.bivector, b.e20, -twisted, b.e31 * w_e0123),
+          .e30 = dot(e.bivector, b.e30, -twisted, b.e12 * w_e0123),
           .e0123 = quad * -w_e0123};
 }
 
@@ -591,11 +591,11 @@ template <class S>
       dot(-r.e23, r.e23, -r.e31, r.e31, -r.e12, r.e12, r.e10, r.e10, r.e20, r.e20, r.e30, r.e30),
       -r.e0123 * r.e0123);
   return {.e23 = dot(f.bivector, r.e23, f.twisted, -r.e0123 * r.e10),
-          .e31 = -dot(f.bivector, -r.e31, f.twisted, r.e0123 * r.e20),
+          .e31 = dot(f.bivector, r.e31, -f.twisted, r.e0123 * r.e20),
           .e12 = dot(f.bivector, r.e12, f.twisted, -r.e0123 * r.e30),
-          .e10 = -dot(f.bivector, -r.e10, f.twisted, -r.e0123 * r.e23),
-          .e20 = -dot(f.bivector, -r.e20, f.twisted, -r.e0123 * r.e31),
-          .e30 = -dot(f.bivector, -r.e30, f.twisted, -r.e0123 * r.e12)};
+          .e10 = dot(f.bivector, r.e10, -f.twisted, -r.e0123 * r.e23),
+          .e20 = dot(f.bivector, r.e20, -f.twisted, -r.e0123 * r.e31),
+          .e30 = dot(f.bivector, r.e30, -f.twisted, -r.e0123 * r.e12)};
 }
 
 /// cayley: Bivector -> Rotor
@@ -615,11 +615,11 @@ template <class S>
   const S even = S(2) * twice;
   return {.s = (mul_add(-square, square, S(1)) + S(4) * -omega) * inverse,
           .e23 = dot(linear, b.e23, even, b.e10 * w_e0123),
-          .e31 = -dot(linear, -b.e31, even, -b.e20 * w_e0123),
+          .e31 = dot(linear, b.e31, -even, -b.e20 * w_e0123),
           .e12 = dot(linear, b.e12, even, b.e30 * w_e0123),
-          .e10 = -dot(linear, -b.e10, even, b.e23 * w_e0123),
-          .e20 = -dot(linear, -b.e20, even, b.e31 * w_e0123),
-          .e30 = -dot(linear, -b.e30, even, b.e12 * w_e0123),
+          .e10 = dot(linear, b.e10, -even, b.e23 * w_e0123),
+          .e20 = dot(linear, b.e20, -even, b.e31 * w_e0123),
+          .e30 = dot(linear, b.e30, -even, b.e12 * w_e0123),
           .e0123 = even * -w_e0123};
 }
 
@@ -639,11 +639,11 @@ template <class S>
   const S inverse = scaling.in / dot(slip, slip, near, near);
   const S linear = near * inverse;
   return {.e23 = dot(linear, r.e23, inverse, r.e10 * slip),
-          .e31 = -dot(linear, -r.e31, inverse, -r.e20 * slip),
+          .e31 = dot(linear, r.e31, -inverse, -r.e20 * slip),
           .e12 = dot(linear, r.e12, inverse, r.e30 * slip),
-          .e10 = -dot(linear, -r.e10, inverse, r.e23 * slip),
-          .e20 = -dot(linear, -r.e20, inverse, r.e31 * slip),
-          .e30 = -dot(linear, -r.e30, inverse, r.e12 * slip)};
+          .e10 = dot(linear, r.e10, -inverse, r.e23 * slip),
+          .e20 = dot(linear, r.e20, -inverse, r.e31 * slip),
+          .e30 = dot(linear, r.e30, -inverse, r.e12 * slip)};
 }
 
 /// normalize: Rotor -> Rotor
@@ -662,11 +662,11 @@ template <class S>
   const S turn = -q_e0123 / (root * radius);
   return {.s = dot(factor, r.s, turn, -r.e0123),
           .e23 = dot(factor, r.e23, turn, -r.e10),
-          .e31 = -dot(factor, -r.e31, turn, r.e20),
+          .e31 = dot(factor, r.e31, -turn, r.e20),
           .e12 = dot(factor, r.e12, turn, -r.e30),
-          .e10 = -dot(factor, -r.e10, turn, -r.e23),
-          .e20 = -dot(factor, -r.e20, turn, -r.e31),
-          .e30 = -dot(factor, -r.e30, turn, -r.e12),
+          .e10 = dot(factor, r.e10, turn, r.e23),
+          .e20 = dot(factor, r.e20, turn, r.e31),
+          .e30 = dot(factor, r.e30, turn, r.e12),
           .e0123 = dot(factor, r.e0123, turn, r.s)};
 }
 

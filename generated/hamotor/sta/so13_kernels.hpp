@@ -251,11 +251,11 @@ template <class S>
   const S twisted = S(2) * e.twisted;
   return {.s = e.number,
           .e23 = dot(e.bivector, b_e23, twisted, b_e01 * w_e0123),
-          .e31 = -dot(e.bivector, b_e13, twisted, -b_e02 * w_e0123),
+          .e31 = dot(-e.bivector, b_e13, -twisted, -b_e02 * w_e0123),
           .e12 = dot(e.bivector, b_e12, twisted, b_e03 * w_e0123),
-          .e10 = -dot(e.bivector, b_e01, twisted, -b_e23 * w_e0123),
-          .e20 = -dot(e.bivector, b_e02, twisted, b_e13 * w_e0123),
-          .e30 = -dot(e.bivector, b_e03, twisted, -b_e12 * w_e0123),
+          .e10 = dot(-e.bivector, b_e01, -twisted, -b_e23 * w_e0123),
+          .e20 = dot(-e.bivector, b_e02, -twisted, b_e13 * w_e0123),
+          .e30 = dot(-e.bivector, b_e03, -twisted, -b_e12 * w_e0123),
           .e0123 = quad * w_e0123};
 }
 
@@ -301,11 +301,11 @@ template <class S>
   const S even = S(2) * twice;
   return {.s = (mul_add(-square, square, S(1)) + S(4) * -omega) * inverse,
           .e23 = dot(linear, b_e23, even, b_e01 * w_e0123),
-          .e31 = -dot(linear, b_e13, even, -b_e02 * w_e0123),
+          .e31 = dot(-linear, b_e13, -even, -b_e02 * w_e0123),
           .e12 = dot(linear, b_e12, even, b_e03 * w_e0123),
-          .e10 = -dot(linear, b_e01, even, -b_e23 * w_e0123),
-          .e20 = -dot(linear, b_e02, even, b_e13 * w_e0123),
-          .e30 = -dot(linear, b_e03, even, -b_e12 * w_e0123),
+          .e10 = dot(-linear, b_e01, -even, -b_e23 * w_e0123),
+          .e20 = dot(-linear, b_e02, -even, b_e13 * w_e0123),
+          .e30 = dot(-linear, b_e03, -even, -b_e12 * w_e0123),
           .e0123 = even * w_e0123};
 }
 

@@ -31,6 +31,7 @@ from hamotor.codegen.program import (
     Sum,
     negative,
     number,
+    opposite,
     sum_of_products,
 )
 from hamotor.codegen.transcendental import (
@@ -169,7 +170,7 @@ def _log_program(
     outputs: list[tuple[str, Expression]] = []
     for component, functional in zip(result.components, result.reading, strict=True):
         ((blade, x),) = functional.items()
-        outputs.append((component.name, out[blade] if x > 0 else negative(out[blade])))
+        outputs.append((component.name, out[blade] if x > 0 else opposite(out[blade])))
     return Program((parameter,), tuple(writer.bindings), tuple(outputs), result)
 
 

@@ -388,6 +388,26 @@ def negative(x: Expression) -> Expression:
             return Negative(x)
 
 
+def opposite(x: Expression) -> Expression:
+    """−x for a result, with the sign inside a chain of multiply-adds, where it costs nothing.
+
+    From outside, g++ 12 moves it there by itself, where numbers are alone and not in lanes, and a
+    sum that cancels is then a zero of the other sign.
+    """
+    match x:
+        case MultiplyAdd(a, b, c):
+            a, b = _opposite_factors(a, b)
+            return replace(x, a=a, b=b, c=opposite(c))
+        case Product(a, b):
+            return Product(*_opposite_factors(a, b))
+        case _:
+            return negative(x)
+
+
+def _opposite_factors(a: Expression, b: Expression) -> tuple[Expression, Expression]:
+    return (a, b.x) if isinstance(b, Negative) else (negative(a), b)
+
+
 def sum_of_products(terms: list[tuple[Expression, ...]]) -> Expression:
     """Σ of products of one or two factors, as one chain of multiply-adds in the given order.
 

@@ -17,8 +17,8 @@ from hamotor.codegen.program import (
     Number,
     Product,
     Sum,
-    negative,
     number,
+    opposite,
     polynomial_expression,
 )
 
@@ -66,7 +66,7 @@ def outputs_for(
         for monomial, x in p.items():
             value = values[int(monomial[0])]
             if abs(x) == 1:
-                term = value if x > 0 else negative(value)
+                term = value if x > 0 else opposite(value)
                 total = term if total is None else Sum(total, term)
             else:
                 scaled = number(x)

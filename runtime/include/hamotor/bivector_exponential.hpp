@@ -1,6 +1,8 @@
 // The numbers in exp B for a general bivector B of an algebra with at most five dimensions.
 #pragma once
 
+#include <tuple>
+
 #include "hamotor/scalar.hpp"
 
 namespace hamotor::scalar {
@@ -12,6 +14,10 @@ struct BivectorExponential {
   S quad;
   S bivector;
   S twisted;
+
+  [[nodiscard]] constexpr auto numbers() noexcept {
+    return std::tie(number, quad, bivector, twisted);
+  }
 };
 
 namespace detail {
@@ -114,6 +120,7 @@ template <class S>
 /// S ± √ω where the planes are nearly or exactly isoclinic or where λ is complex.  Small B go by
 /// the power series, in which neither matters.  Each form is free of cancellation.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] BivectorExponential<S> bivector_exponential(const S& s, const S& omega) noexcept {
   const S root = sqrt(abs(omega));
   if (!(abs(s) + root > S(1))) return detail::exponential_series(s, omega);
@@ -124,6 +131,7 @@ template <class S>
 /// The same for algebras with a blade J of grade 4, J² = 1, from w in W = w J + … and, without
 /// cancellation between S and W, what −B² is where J = 1 and where J = −1.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] BivectorExponential<S> bivector_exponential(const S& w, const S& plus,
                                                           const S& minus) noexcept {
   const S s = S(-0.5) * (plus + minus);
@@ -135,6 +143,7 @@ template <class S>
 
 /// The same with √ω and, where ω > S²/4, with S + √ω (for S > 0: S − √ω) without cancellation.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] BivectorExponential<S> bivector_exponential(const S& s, const S& omega, const S& root,
                                                           const S& near) noexcept {
   if (omega > S(0.25) * (s * s) && abs(s) + root > S(1)) {
@@ -142,6 +151,15 @@ template <class S>
     return detail::isoclinic_exponential(near, s - root, root);
   }
   return bivector_exponential(s, omega);
+}
+
+/// Any of these in each lane of packs, which fall into different cases.
+template <class S, class... More>
+  requires has_lanes<S>
+[[nodiscard]] BivectorExponential<S> bivector_exponential(const S& x,
+                                                          const More&... more) noexcept {
+  return by_lane<BivectorExponential>(
+      [](const auto&... number) { return bivector_exponential(number...); }, x, more...);
 }
 
 }  // namespace hamotor::scalar

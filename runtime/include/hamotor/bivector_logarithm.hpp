@@ -1,6 +1,8 @@
 // The numbers in log R for a general rotor R of an algebra with at most five dimensions.
 #pragma once
 
+#include <tuple>
+
 #include "hamotor/scalar.hpp"
 
 namespace hamotor::scalar {
@@ -10,6 +12,8 @@ template <class S>
 struct BivectorLogarithm {
   S bivector;
   S twisted;
+
+  [[nodiscard]] constexpr auto numbers() noexcept { return std::tie(bivector, twisted); }
 };
 
 namespace detail {
@@ -104,6 +108,7 @@ template <class S>
 /// Where `isoclinic` > 0, `near` is the one of S ± 2 c √ρ that may nearly vanish, of the sign that
 /// S has not, without cancellation.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square, const S& rho,
                                                       const S& isoclinic, const S& near) noexcept {
   const S root = sqrt(abs(rho));
@@ -142,6 +147,7 @@ template <class S>
 
 /// The same where √ρ is 0 or no number: S ± 2 c √ρ cannot cancel.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square,
                                                       const S& rho) noexcept {
   return bivector_logarithm(c, square, rho, S(0), S(0));
@@ -156,6 +162,10 @@ struct TurnedLogarithm {
   S turn;
   S part;
   S part_twisted;
+
+  [[nodiscard]] constexpr auto numbers() noexcept {
+    return std::tie(bivector, twisted, turn, part, part_twisted);
+  }
 };
 
 /// The numbers of log R also where one plane turns by a half angle b near π beside a boost, a null
@@ -165,6 +175,7 @@ struct TurnedLogarithm {
 /// rounding of the other.  So log R = log(−R) + π × the unit of that plane, of which no number is
 /// large.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] TurnedLogarithm<S> turned_logarithm(const S& c, const S& square, const S& rho,
                                                   const S& isoclinic, const S& near) noexcept {
   // <R>₂² is `turning` where R turns and `other` in the other plane; their product is c² ρ
@@ -186,6 +197,7 @@ template <class S>
 
 /// The same where √ρ is 0 or no number.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] TurnedLogarithm<S> turned_logarithm(const S& c, const S& square,
                                                   const S& rho) noexcept {
   return turned_logarithm(c, square, rho, S(0), S(0));
@@ -207,10 +219,15 @@ struct PlanesLogarithm {
   S seed_minus;
   S along;
   S across;
+
+  [[nodiscard]] constexpr auto numbers() noexcept {
+    return std::tie(plus, minus, unit_plus, unit_minus, seed_plus, seed_minus, along, across);
+  }
 };
 
 /// From c, q and what −<R>₂² is where J = 1 and where J = −1, without cancellation between them.
 template <class S>
+  requires(!has_lanes<S>)
 [[nodiscard]] PlanesLogarithm<S> planes_logarithm(const S& c, const S& q, const S& plus,
                                                   const S& minus) noexcept {
   struct Turn {
@@ -234,6 +251,28 @@ template <class S>
   const S along = cotangent(S(0.5) * (p.angle - m.angle));
   const S across = cotangent(S(0.5) * (p.angle + m.angle)) - along;
   return {p.ratio, m.ratio, p.unit, m.unit, p.seed, m.seed, along, across};
+}
+
+/// Any of these in each lane of packs, which fall into different cases.
+template <class S, class... More>
+  requires has_lanes<S>
+[[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& x, const More&... more) noexcept {
+  return by_lane<BivectorLogarithm>(
+      [](const auto&... number) { return bivector_logarithm(number...); }, x, more...);
+}
+
+template <class S, class... More>
+  requires has_lanes<S>
+[[nodiscard]] TurnedLogarithm<S> turned_logarithm(const S& x, const More&... more) noexcept {
+  return by_lane<TurnedLogarithm>([](const auto&... number) { return turned_logarithm(number...); },
+                                  x, more...);
+}
+
+template <class S, class... More>
+  requires has_lanes<S>
+[[nodiscard]] PlanesLogarithm<S> planes_logarithm(const S& x, const More&... more) noexcept {
+  return by_lane<PlanesLogarithm>([](const auto&... number) { return planes_logarithm(number...); },
+                                  x, more...);
 }
 
 }  // namespace hamotor::scalar

@@ -13,7 +13,9 @@
 #include <cstdint>
 #include <limits>
 #include <string_view>
+#include <tuple>
 #include <type_traits>
+#include <utility>
 
 #if defined(__SIZEOF_FLOAT128__) && LDBL_MANT_DIG != 113
 #define HAMOTOR_HAS_QUADMATH 1
@@ -322,6 +324,22 @@ template <class S>
 using NumberOf = typename detail::Number<S>::type;
 template <class S>
 inline constexpr bool has_lanes = !std::is_same_v<NumberOf<S>, S>;
+
+/// The numbers that `f` gives for each lane's, gathered: of formulas that fall into cases.
+/// `Result<S>::numbers()` is a tuple of references to its numbers.
+template <template <class> class Result, class Function, class S, class... More>
+  requires has_lanes<S>
+[[nodiscard]] constexpr Result<S> by_lane(const Function& f, const S& x,
+                                          const More&... more) noexcept {
+  Result<S> gathered;
+  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+    Result<NumberOf<S>> one = f(x[lane], more[lane]...);
+    [&]<std::size_t... i>(std::index_sequence<i...>) {
+      (std::get<i>(gathered.numbers()).set(lane, std::get<i>(one.numbers())), ...);
+    }(std::make_index_sequence<std::tuple_size_v<decltype(one.numbers())>>{});
+  }
+  return gathered;
+}
 
 /// Whether squares of numbers and of their inverses overflow only where nothing is meant by them.
 template <class S>
