@@ -363,6 +363,7 @@ template <template <class> class C, class S, class Kind>
     using One = Held<C<S>, Kind>;
     constexpr std::size_t n = std::min(sizeof(One) / sizeof(S), sizeof block / sizeof(Lanes<S>));
     auto* const numbers = reinterpret_cast<Lanes<S>*>(&block);
+    std::fill_n(numbers, n, Lanes<S>(0));
     for (std::size_t lane = 0; lane < Lanes<S>::lanes; ++lane) {
       const One one = make<C<S>>(kind, exact[lane]);
       const auto* const from = reinterpret_cast<const S*>(&one);

@@ -20,7 +20,7 @@ KERNELS = lean_kernels()
 IDS = [f"{algebra} {k.namespace} {k.name} {k.operands[0].name}" for algebra, k in KERNELS]
 HALF_TURN, WHOLE_TURN = math.pi / 2, 3.14159
 PROMISED = {
-    "exp_lean": (WHOLE_TURN, 6.0),
+    "exp_lean": (2.0, 6.0),
     "log_lean": (HALF_TURN, 4.0),
     "cayley_lean": (WHOLE_TURN, 6.0),
     "cayley_inverse_lean": (HALF_TURN, 4.0),
@@ -100,6 +100,8 @@ SHORTENED = [
     for kernel in library(read_algebra(bundled_path(algebra)))
     if kernel.shortcut is not None
 ]
+SHORTENED_EXPONENTIALS = [(a, k) for a, k in SHORTENED if k.name == "exp"]
+SHORTENED_LOGARITHMS = [(a, k) for a, k in SHORTENED if k.name == "log"]
 SHORTENED_IDS = [f"{a} {k.namespace} {k.name} {k.operands[0].name}" for a, k in SHORTENED]
 
 
@@ -121,30 +123,52 @@ def farthest(kernel: Kernel) -> float:
     """The half angle up to which a kernel takes its shortcut."""
     assert kernel.shortcut is not None
     pitched = "moderate" in dict(kernel.shortcut.where.outputs)
-    return HALF_TURN if pitched else math.acos(-7 / 8)
+    return HALF_TURN if pitched or kernel.name == "exp" else math.acos(-7 / 8)
 
 
-def test_the_logarithms_have_shortcuts() -> None:
-    assert len(SHORTENED) == 7
-    assert {kernel.name for _, kernel in SHORTENED} == {"log"}
+def shortcut(kernel: Kernel) -> Kernel:
+    """The shortcut as a kernel of its own."""
+    assert kernel.shortcut is not None
+    return replace(kernel, name=f"{kernel.name}_lean", program=kernel.shortcut.program)
+
+
+def test_exponentials_and_logarithms_have_shortcuts() -> None:
+    assert [kernel.name for _, kernel in SHORTENED].count("exp") == 7
+    assert [kernel.name for _, kernel in SHORTENED].count("log") == 7
+    assert len(SHORTENED) == 14
 
 
 @pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
-def test_a_shortcut_is_taken_for_unit_versors_and_as_accurate(algebra: str, kernel: Kernel) -> None:
-    assert kernel.shortcut is not None
-    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
-    measure, dice = Measure(algebra, short), random.Random(2)
+def test_a_shortcut_is_taken_where_it_may_be_and_as_accurate(algebra: str, kernel: Kernel) -> None:
+    measure, dice = Measure(algebra, shortcut(kernel)), random.Random(2)
+    allowed = 4.5 if kernel.name == "exp" else 4
     for angle, translation in inputs(dice, 0.999 * farthest(kernel), 60):
         numbers, error = measure.numbers_and_error(dice, angle, translation)
         assert all(taken(kernel, numbers).values()), (angle, translation)
-        assert error <= 4, (angle, translation)
+        assert error <= allowed, (angle, translation)
 
 
-@pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
+@pytest.mark.parametrize(
+    ("algebra", "kernel"), SHORTENED_EXPONENTIALS, ids=lambda x: getattr(x, "namespace", x)
+)
+def test_an_exponential_s_shortcut_is_not_taken_where_it_would_be_wrong(
+    algebra: str, kernel: Kernel
+) -> None:
+    measure, dice = Measure(algebra, shortcut(kernel)), random.Random(3)
+    beyond, _ = measure.numbers_and_error(dice, HALF_TURN + 0.01, 1.0)
+    assert not taken(kernel, beyond)["angle"]
+    for factor in (1e200, math.inf, math.nan):
+        assert not taken(kernel, [factor * x for x in beyond])["angle"], factor
+    if "moderate" in taken(kernel, beyond):
+        far, _ = measure.numbers_and_error(dice, 1.0, 1e100)
+        assert not taken(kernel, far)["moderate"]
+
+
+@pytest.mark.parametrize(
+    ("algebra", "kernel"), SHORTENED_LOGARITHMS, ids=lambda x: getattr(x, "namespace", x)
+)
 def test_what_is_not_unit_counts_once_in_a_shortcut(algebra: str, kernel: Kernel) -> None:
-    assert kernel.shortcut is not None
-    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
-    measure, dice = Measure(algebra, short), random.Random(4)
+    measure, dice = Measure(algebra, shortcut(kernel)), random.Random(4)
     defect = 240 * 2.0**-52
     for angle, translation in inputs(dice, 0.999 * farthest(kernel), 60):
         for sign in (1, -1):
@@ -154,11 +178,13 @@ def test_what_is_not_unit_counts_once_in_a_shortcut(algebra: str, kernel: Kernel
             assert error <= 4 + defect * 2**53, (angle, translation)
 
 
-@pytest.mark.parametrize(("algebra", "kernel"), SHORTENED, ids=SHORTENED_IDS)
-def test_a_shortcut_is_not_taken_where_it_would_be_wrong(algebra: str, kernel: Kernel) -> None:
-    assert kernel.shortcut is not None
-    short = replace(kernel, name="log_lean", program=kernel.shortcut.program)
-    measure, dice = Measure(algebra, short), random.Random(3)
+@pytest.mark.parametrize(
+    ("algebra", "kernel"), SHORTENED_LOGARITHMS, ids=lambda x: getattr(x, "namespace", x)
+)
+def test_a_logarithm_s_shortcut_is_not_taken_where_it_would_be_wrong(
+    algebra: str, kernel: Kernel
+) -> None:
+    measure, dice = Measure(algebra, shortcut(kernel)), random.Random(3)
     beyond, _ = measure.numbers_and_error(dice, farthest(kernel) + 0.01, 1.0)
     assert not taken(kernel, beyond)["angle"]
     numbers, _ = measure.numbers_and_error(dice, 1.0, 1.0)

@@ -30,12 +30,14 @@ void expect_lanes_as_alone_of(const std::vector<Element<double>>& elements, cons
     const auto of_lane = [&](std::size_t lane) -> const auto& {
       return elements[(first + lane) % elements.size()];
     };
-    std::array<Pack<double, W>, Element<double>::size> numbers{};
+    Element<Pack<double, W>> together{};
     for (std::size_t lane = 0; lane < W; ++lane) {
+      auto numbers = together.components();
       const auto alone = of_lane(lane).components();
       for (std::size_t i = 0; i < alone.size(); ++i) numbers[i].set(lane, alone[i]);
+      together = together.from(numbers);
     }
-    const auto found = kernel(Element<Pack<double, W>>::from(numbers)).components();
+    const auto found = kernel(together).components();
     for (std::size_t lane = 0; lane < W; ++lane) {
       const auto alone = kernel(of_lane(lane)).components();
       for (std::size_t i = 0; i < alone.size(); ++i) {

@@ -2585,36 +2585,62 @@ template <class S>
 /// exp(B) = 1 + B + B²/2 + ….
 /// Relative error at most 4 ulp of the result's norm and ε² of the translation's, for half
 /// angles up to 1/(8 ε).
+/// By a shortcut for half angles up to π/2.
 /// Cost: 22 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
-/// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos.
+/// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos; by the
+/// shortcut 20 mul, 12 add (9 fused), 2 div, 1 cos, 1 max_abs, 1 moderate, 2 select, 1 sin, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const Line<S>& l) noexcept {
-  const auto w_scaling = scalar::scaling(scalar::max_abs(l.e12, -l.e31, l.e23));
-  const S w_e12 = w_scaling.in * l.e12;
-  const S w_e13 = w_scaling.in * -l.e31;
-  const S w_e23 = w_scaling.in * l.e23;
-  const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
-  const auto root = scalar::double_word_sqrt_parts(squares);
-  const auto angle = scalar::double_word_scaled(root, w_scaling.out);
-  const auto turn = scalar::sin_cos(angle);
-  const S length = root.hi + root.lo;
-  const S spin = select(length > S(0), turn.sin / length, S(0));
-  const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
-  const auto v_scaling = scalar::scaling(scalar::max_abs(l.e1i, l.e2i, l.e3i));
-  const S v_e1i = v_scaling.in * l.e1i;
-  const S v_e2i = v_scaling.in * l.e2i;
-  const S v_e3i = v_scaling.in * l.e3i;
-  const S product = scalar::compensated_dot(w_e12, v_e3i, -w_e13, v_e2i, w_e23, v_e1i);
-  const S square = squares.hi + squares.lo;
-  const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
-  return {.s = turn.cos,
-          .e23 = spin * w_e23,
-          .e31 = -spin * w_e13,
-          .e12 = spin * w_e12,
-          .e1i = v_scaling.out * dot(sinc, v_e1i, along, -w_e23),
-          .e2i = v_scaling.out * dot(sinc, v_e2i, along, w_e13),
-          .e3i = v_scaling.out * dot(sinc, v_e3i, along, -w_e12),
-          .e123i = v_scaling.out * (spin * product)};
+  const S turning = dot(l.e12, l.e12, l.e31, l.e31, l.e23, l.e23);
+  const auto usual = (S(2.46875) - turning) > S(0) &&
+                     (scalar::moderate<S>() - scalar::max_abs(l.e1i, l.e2i, l.e3i)) > S(0);
+  const auto shortly = [&]() noexcept -> Motor<S> {
+    const S square = dot(l.e12, l.e12, l.e31, l.e31, l.e23, l.e23);
+    const S length = scalar::sqrt(square);
+    const S cosine = scalar::cos(length);
+    const S spin = select(length > S(0), scalar::sin(length) / length, S(1));
+    const S product = dot(l.e12, l.e3i, l.e31, l.e2i, l.e23, l.e1i);
+    const S along = select(square > S(0), (spin - cosine) * (product / square), S(0));
+    return {.s = cosine,
+            .e23 = spin * l.e23,
+            .e31 = spin * l.e31,
+            .e12 = spin * l.e12,
+            .e1i = dot(spin, l.e1i, along, -l.e23),
+            .e2i = dot(spin, l.e2i, along, -l.e31),
+            .e3i = dot(spin, l.e3i, along, -l.e12),
+            .e123i = spin * product};
+  };
+  if (scalar::everywhere(usual)) [[likely]] {
+    return shortly();
+  }
+  return scalar::chosen(usual, shortly, [=]() noexcept -> Motor<S> {
+    const auto w_scaling = scalar::scaling(scalar::max_abs(l.e12, -l.e31, l.e23));
+    const S w_e12 = w_scaling.in * l.e12;
+    const S w_e13 = w_scaling.in * -l.e31;
+    const S w_e23 = w_scaling.in * l.e23;
+    const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
+    const auto root = scalar::double_word_sqrt_parts(squares);
+    const auto angle = scalar::double_word_scaled(root, w_scaling.out);
+    const auto turn = scalar::sin_cos(angle);
+    const S length = root.hi + root.lo;
+    const S spin = select(length > S(0), turn.sin / length, S(0));
+    const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
+    const auto v_scaling = scalar::scaling(scalar::max_abs(l.e1i, l.e2i, l.e3i));
+    const S v_e1i = v_scaling.in * l.e1i;
+    const S v_e2i = v_scaling.in * l.e2i;
+    const S v_e3i = v_scaling.in * l.e3i;
+    const S product = scalar::compensated_dot(w_e12, v_e3i, -w_e13, v_e2i, w_e23, v_e1i);
+    const S square = squares.hi + squares.lo;
+    const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
+    return {.s = turn.cos,
+            .e23 = spin * w_e23,
+            .e31 = -spin * w_e13,
+            .e12 = spin * w_e12,
+            .e1i = v_scaling.out * dot(sinc, v_e1i, along, -w_e23),
+            .e2i = v_scaling.out * dot(sinc, v_e2i, along, w_e13),
+            .e3i = v_scaling.out * dot(sinc, v_e3i, along, -w_e12),
+            .e123i = v_scaling.out * (spin * product)};
+  });
 }
 
 /// log: Motor -> Line

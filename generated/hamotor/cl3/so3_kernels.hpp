@@ -139,24 +139,41 @@ template <class S>
 /// exp: Rate -> Rotor
 /// exp(B) = 1 + B + B²/2 + ….
 /// Relative error at most 4 ulp of the result's norm, for half angles up to 1/(8 ε).
+/// By a shortcut for half angles up to π/2.
 /// Cost: 9 mul, 1 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
-/// double_word_sqrt_parts, 1 max_abs, 1 scaling, 1 select, 1 sin_cos.
+/// double_word_sqrt_parts, 1 max_abs, 1 scaling, 1 select, 1 sin_cos; by the shortcut 10 mul, 5 add
+/// (4 fused), 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp(const so3::Rate<S>& w) noexcept {
-  const S b_e12 = S(0.5) * -w.w12;
-  const S b_e13 = S(0.5) * w.w31;
-  const S b_e23 = S(0.5) * -w.w23;
-  const auto w_scaling = scalar::scaling(scalar::max_abs(b_e12, b_e13, b_e23));
-  const S w_e12 = w_scaling.in * b_e12;
-  const S w_e13 = w_scaling.in * b_e13;
-  const S w_e23 = w_scaling.in * b_e23;
-  const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
-  const auto root = scalar::double_word_sqrt_parts(squares);
-  const auto angle = scalar::double_word_scaled(root, w_scaling.out);
-  const auto turn = scalar::sin_cos(angle);
-  const S length = root.hi + root.lo;
-  const S spin = select(length > S(0), turn.sin / length, S(0));
-  return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -spin * w_e13, .e12 = spin * w_e12};
+  const S turning = dot(w.w12, w.w12, w.w31, w.w31, w.w23, w.w23);
+  const auto usual = (S(9.875) - turning) > S(0);
+  const auto shortly = [&]() noexcept -> Rotor<S> {
+    const S square = dot(w.w12, w.w12, w.w31, w.w31, w.w23, w.w23);
+    const S length = scalar::sqrt(square);
+    const S angle = S(0.5) * length;
+    const S cosine = scalar::cos(angle);
+    const S spin = select(length > S(0), scalar::sin(angle) / length, S(0.5));
+    return {.s = cosine, .e23 = spin * -w.w23, .e31 = -spin * w.w31, .e12 = spin * -w.w12};
+  };
+  if (scalar::everywhere(usual)) [[likely]] {
+    return shortly();
+  }
+  return scalar::chosen(usual, shortly, [=]() noexcept -> Rotor<S> {
+    const S b_e12 = S(0.5) * -w.w12;
+    const S b_e13 = S(0.5) * w.w31;
+    const S b_e23 = S(0.5) * -w.w23;
+    const auto w_scaling = scalar::scaling(scalar::max_abs(b_e12, b_e13, b_e23));
+    const S w_e12 = w_scaling.in * b_e12;
+    const S w_e13 = w_scaling.in * b_e13;
+    const S w_e23 = w_scaling.in * b_e23;
+    const auto squares = scalar::compensated_dot_parts(w_e12, w_e12, w_e13, w_e13, w_e23, w_e23);
+    const auto root = scalar::double_word_sqrt_parts(squares);
+    const auto angle = scalar::double_word_scaled(root, w_scaling.out);
+    const auto turn = scalar::sin_cos(angle);
+    const S length = root.hi + root.lo;
+    const S spin = select(length > S(0), turn.sin / length, S(0));
+    return {.s = turn.cos, .e23 = spin * w_e23, .e31 = -spin * w_e13, .e12 = spin * w_e12};
+  });
 }
 
 /// log: Rotor -> Rate
@@ -248,8 +265,9 @@ template <class S>
 
 /// exp_lean: Rate -> Rotor
 /// exp(B) = 1 + B + B²/2 + ….
-/// Lean: error at most 6 ulp of the result's norm, measured for half angles up to π; beyond, it
-/// grows with the angle.  Squares of coordinates must not overflow.
+/// Lean: error at most 6 ulp of the result's norm, measured for half angles θ up to 2; then, of
+/// translations across the axis, it grows like 1/(π − θ): 30 at 2.9; beyond π it grows with the
+/// angle.  Squares of coordinates must not overflow.
 /// Cost: 7 mul, 2 add (2 fused), 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> exp_lean(const so3::Rate<S>& w) noexcept {

@@ -139,23 +139,40 @@ template <class S>
 /// exp(B) = 1 + B + B²/2 + ….
 /// Relative error at most 4 ulp of the result's norm and ε² of the translation's, for half
 /// angles up to 1/(8 ε).
+/// By a shortcut for half angles up to π/2.
 /// Cost: 8 mul, 2 add, 1 div, 1 compensated_dot_parts, 1 double_word_scaled, 1
-/// double_word_sqrt_parts, 1 max_abs, 1 scaling, 2 select, 1 sin_cos.
+/// double_word_sqrt_parts, 1 max_abs, 1 scaling, 2 select, 1 sin_cos; by the shortcut 6 mul, 1 add,
+/// 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp(const se2::Rate<S>& w) noexcept {
-  const S b_e01 = S(0.5) * -w.v1;
-  const S b_e02 = S(0.5) * -w.v2;
-  const S b_e12 = S(0.5) * -w.w12;
-  const auto w_scaling = scalar::scaling(scalar::max_abs(b_e12));
-  const S w_e12 = w_scaling.in * b_e12;
-  const auto squares = scalar::compensated_dot_parts(w_e12, w_e12);
-  const auto root = scalar::double_word_sqrt_parts(squares);
-  const auto angle = scalar::double_word_scaled(root, w_scaling.out);
-  const auto turn = scalar::sin_cos(angle);
-  const S length = root.hi + root.lo;
-  const S spin = select(length > S(0), turn.sin / length, S(0));
-  const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
-  return {.s = turn.cos, .e12 = spin * w_e12, .e01 = sinc * b_e01, .e02 = sinc * b_e02};
+  const S turning = w.w12 * w.w12;
+  const auto usual = (S(9.875) - turning) > S(0);
+  const auto shortly = [&]() noexcept -> Motor<S> {
+    const S square = w.w12 * w.w12;
+    const S length = scalar::sqrt(square);
+    const S angle = S(0.5) * length;
+    const S cosine = scalar::cos(angle);
+    const S spin = select(length > S(0), scalar::sin(angle) / length, S(0.5));
+    return {.s = cosine, .e12 = spin * -w.w12, .e01 = spin * -w.v1, .e02 = spin * -w.v2};
+  };
+  if (scalar::everywhere(usual)) [[likely]] {
+    return shortly();
+  }
+  return scalar::chosen(usual, shortly, [=]() noexcept -> Motor<S> {
+    const S b_e01 = S(0.5) * -w.v1;
+    const S b_e02 = S(0.5) * -w.v2;
+    const S b_e12 = S(0.5) * -w.w12;
+    const auto w_scaling = scalar::scaling(scalar::max_abs(b_e12));
+    const S w_e12 = w_scaling.in * b_e12;
+    const auto squares = scalar::compensated_dot_parts(w_e12, w_e12);
+    const auto root = scalar::double_word_sqrt_parts(squares);
+    const auto angle = scalar::double_word_scaled(root, w_scaling.out);
+    const auto turn = scalar::sin_cos(angle);
+    const S length = root.hi + root.lo;
+    const S spin = select(length > S(0), turn.sin / length, S(0));
+    const S sinc = select((S(1.5) - w_scaling.in) > S(0), spin * w_scaling.in, S(1));
+    return {.s = turn.cos, .e12 = spin * w_e12, .e01 = sinc * b_e01, .e02 = sinc * b_e02};
+  });
 }
 
 /// log: Motor -> Rate
@@ -245,8 +262,9 @@ template <class S>
 
 /// exp_lean: Rate -> Motor
 /// exp(B) = 1 + B + B²/2 + ….
-/// Lean: error at most 6 ulp of the result's norm, measured for half angles up to π; beyond, it
-/// grows with the angle.  Squares of coordinates must not overflow.
+/// Lean: error at most 6 ulp of the result's norm, measured for half angles θ up to 2; then, of
+/// translations across the axis, it grows like 1/(π − θ): 30 at 2.9; beyond π it grows with the
+/// angle.  Squares of coordinates must not overflow.
 /// Cost: 5 mul, 0 add, 1 div, 1 cos, 1 select, 1 sin, 1 sqrt.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> exp_lean(const se2::Rate<S>& w) noexcept {

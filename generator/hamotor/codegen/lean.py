@@ -37,6 +37,7 @@ from hamotor.codegen.program import (
 from hamotor.codegen.transcendental import (
     ONE,
     ZERO,
+    Plane,
     axis_part,
     call,
     pitch_pairs,
@@ -64,10 +65,10 @@ def _one_factor(sizes: set[Rational], where: str) -> Rational:
     return sizes.pop()
 
 
-def exp_kernel(
-    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
-) -> Kernel:
-    """exp of B = f (u + v), u its rotation part: sin θ / |u| serves every component."""
+def _coordinates(
+    algebra: Algebra, operand: Element, where: str
+) -> tuple[Plane, dict[Blade, Expression], Rational]:
+    """Of a bivector: how its blades split, ± its coordinates by blade, and the factor of all."""
     (parameter,) = parameters_for(operand)
     value = value_of(parameter)
     plane = required_split(algebra, sorted(value), where)
@@ -76,9 +77,18 @@ def exp_kernel(
     for blade, p in value.items():
         (((name,), sign),) = p.items()
         b[blade] = Name(name) if sign > 0 else Negative(Name(name))
+    return plane, b, factor
+
+
+def _exp_program(algebra: Algebra, operand: Element, result: Element, where: str) -> Program:
+    """exp of B = f (u + v), u its rotation part: sin θ / |u| serves every component.
+
+    What is multiplied into the translation waits for no sine.
+    """
+    plane, b, factor = _coordinates(algebra, operand, where)
     u = {blade: b[blade] for blade in plane.rotation}
     writer = Writer()
-    squares = writer.let("square", sum_of_products([(x, x) for x in map(_unsigned, u.values())]))
+    squares = writer.let("square", _squares(b, plane.rotation))
     length = writer.let("length", call("sqrt", squares))
     angle = writer.let("angle", _times(factor, length))
     cosine = writer.let("cosine", call("cos", angle))
@@ -94,7 +104,7 @@ def exp_kernel(
             if factor == 1
             else MultiplyAdd(number(-factor), cosine, spin)
         )
-        share = Quotient(Product(rest, product), squares)
+        share = Product(rest, Quotient(product, squares))
         along = writer.let("along", Select(squares, share, ZERO))
         turned = axis_part(plane, u)
         for blade in plane.translation:
@@ -104,10 +114,42 @@ def exp_kernel(
     else:
         for blade in plane.translation:
             out[blade] = Product(spin, b[blade])
-    program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
+    return Program(
+        parameters_for(operand), tuple(writer.bindings), outputs_for(out, result), result
+    )
+
+
+def exp_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """exp by the fewest operations."""
+    program = _exp_program(algebra, operand, result, where)
     return Kernel(
         "exp_lean", "exp(B) = 1 + B + B²/2 + …", program, None, namespace, None, EXP_NOTES
     )
+
+
+def shortened_exp_kernel(
+    algebra: Algebra, operand: Element, result: Element, namespace: str, where: str
+) -> Kernel:
+    """exp of every bivector, by the lean one's program for half angles up to π/2."""
+    kernel = transcendental.exp_kernel(algebra, operand, result, namespace, where)
+    try:
+        program = _exp_program(algebra, operand, result, where)
+    except UsageError:
+        return kernel
+    plane, b, factor = _coordinates(algebra, operand, where)
+    writer = Writer()
+    turning = writer.let("turning", _squares(b, plane.rotation))
+    conditions: dict[str, Expression] = {
+        "angle": Sum(number(Fraction(79, 32) / factor**2), negative(turning))
+    }
+    if plane.pitch:
+        size = call("max_abs", *(_unsigned(b[v]) for v in plane.translation))
+        conditions["moderate"] = Sum(call("moderate"), negative(size))
+    near = Program(program.parameters, tuple(writer.bindings), tuple(conditions.items()), None)
+    notes = (*kernel.notes, "By a shortcut for half angles up to π/2.")
+    return replace(kernel, shortcut=Shortcut(near, program), notes=notes)
 
 
 def _plain_blades(operand: Element, where: str) -> dict[Blade, Expression]:
@@ -225,8 +267,9 @@ def _near_unity(algebra: Algebra, operand: Element, where: str) -> tuple[Binding
 
 
 EXP_NOTES = (
-    "Lean: error at most 6 ulp of the result's norm, measured for half angles up to π; beyond, it",
-    "grows with the angle.  Squares of coordinates must not overflow.",
+    "Lean: error at most 6 ulp of the result's norm, measured for half angles θ up to 2; then, of",
+    "translations across the axis, it grows like 1/(π − θ): 30 at 2.9; beyond π it grows with the",
+    "angle.  Squares of coordinates must not overflow.",
 )
 LOG_NOTES = (
     "Lean: error at most 4 ulp of the result's norm, measured for half angles θ up to π/2; then it",

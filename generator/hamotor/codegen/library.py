@@ -538,7 +538,7 @@ def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedFo
     if operation in lean.LEAN:
         return lean.LEAN[operation]
     simple: dict[str, ClosedForm] = {
-        "exp": transcendental.exp_kernel,
+        "exp": lean.shortened_exp_kernel,
         "log": lean.shortened_log_kernel,
         "cayley": transcendental.cayley_kernel,
         "cayley_inverse": transcendental.cayley_inverse_kernel,

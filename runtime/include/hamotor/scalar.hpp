@@ -332,12 +332,15 @@ template <template <class> class Result, class Function, class S, class... More>
 [[nodiscard]] constexpr Result<S> by_lane(const Function& f, const S& x,
                                           const More&... more) noexcept {
   Result<S> gathered;
-  for (std::size_t lane = 0; lane < S::lanes; ++lane) {
-    Result<NumberOf<S>> one = f(x[lane], more[lane]...);
-    [&]<std::size_t... i>(std::index_sequence<i...>) {
+  constexpr auto places =
+      std::make_index_sequence<std::tuple_size_v<decltype(gathered.numbers())>>{};
+  [&]<std::size_t... i>(std::index_sequence<i...>) {
+    ((std::get<i>(gathered.numbers()) = S(0)), ...);
+    for (std::size_t lane = 0; lane < S::lanes; ++lane) {
+      Result<NumberOf<S>> one = f(x[lane], more[lane]...);
       (std::get<i>(gathered.numbers()).set(lane, std::get<i>(one.numbers())), ...);
-    }(std::make_index_sequence<std::tuple_size_v<decltype(one.numbers())>>{});
-  }
+    }
+  }(places);
   return gathered;
 }
 
