@@ -2600,7 +2600,7 @@ template <class S>
     const S cosine = scalar::cos(length);
     const S spin = select(length > S(0), scalar::sin(length) / length, S(1));
     const S product = dot(l.e12, l.e3i, l.e31, l.e2i, l.e23, l.e1i);
-    const S along = select(square > S(0), (spin - cosine) * (product / square), S(0));
+    const S along = select(square > S(0), (spin - cosine) * product / square, S(0));
     return {.s = cosine,
             .e23 = spin * l.e23,
             .e31 = spin * l.e31,

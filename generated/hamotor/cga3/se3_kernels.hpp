@@ -228,8 +228,7 @@ template <class S>
     const S cosine = scalar::cos(angle);
     const S spin = select(length > S(0), scalar::sin(angle) / length, S(0.5));
     const S product = dot(-w.w12, -w.v3, -w.w31, -w.v2, -w.w23, -w.v1);
-    const S along =
-        select(square > S(0), mul_add(S(-0.5), cosine, spin) * (product / square), S(0));
+    const S along = select(square > S(0), mul_add(S(-0.5), cosine, spin) * product / square, S(0));
     return {.s = cosine,
             .e23 = spin * -w.w23,
             .e31 = -spin * w.w31,

@@ -1454,7 +1454,7 @@ template <class S>
     const S cosine = scalar::cos(length);
     const S spin = select(length > S(0), scalar::sin(length) / length, S(1));
     const S product = dot(b.e12, b.e03, b.e31, b.e02, b.e23, b.e01);
-    const S along = select(square > S(0), (spin - cosine) * (product / square), S(0));
+    const S along = select(square > S(0), (spin - cosine) * product / square, S(0));
     return {.s = cosine,
             .e23 = spin * b.e23,
             .e31 = spin * b.e31,
@@ -1510,7 +1510,7 @@ template <class S>
   const S cosine = scalar::cos(length);
   const S spin = select(length > S(0), scalar::sin(length) / length, S(1));
   const S product = dot(b.e12, b.e03, b.e31, b.e02, b.e23, b.e01);
-  const S along = select(square > S(0), (spin - cosine) * (product / square), S(0));
+  const S along = select(square > S(0), (spin - cosine) * product / square, S(0));
   return {.s = cosine,
           .e23 = spin * b.e23,
           .e31 = spin * b.e31,

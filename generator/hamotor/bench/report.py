@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from hamotor.files import whole
@@ -126,7 +127,7 @@ def draw_ratios(account: Mapping[str, Any], file: Path) -> None:
         ax.set_ylim(_TICKS[0], _TICKS[-1])
         ax.set_yticks(_TICKS, [f"{tick:g}" for tick in _TICKS])
         ax.set_xlim(-0.55, len(operations) - 0.45)
-        ax.set_xticks(range(len(operations)), operations)
+        ax.set_xticks(range(len(operations)), [fill(name, 10) for name in operations], fontsize=8)
         ax.set_ylabel(f"{mode}\ntime / best Eigen")
         ax.grid(axis="y", color="#dddddd", linewidth=0.6)
         ax.set_axisbelow(True)
@@ -159,5 +160,6 @@ def _draw_operation(
             edgecolor="white", linewidth=0.4, hatch=_HATCHES.get(row["compiler"], ".."),
         )  # fmt: skip
         if row["contestant"] in {"generated", "generated, packs"}:
-            ax.text(x, max(ratio, 1.0) * 1.08, f"{ratio:.2f}", rotation=90, ha="center",
-                    va="bottom", fontsize=8, color=_BLUE)  # fmt: skip
+            above = ratio >= 1
+            ax.text(x, ratio * (1.08 if above else 0.93), f"{ratio:.2f}", rotation=90, ha="center",
+                    va="bottom" if above else "top", fontsize=8, color=_BLUE)  # fmt: skip

@@ -81,10 +81,7 @@ def _coordinates(
 
 
 def _exp_program(algebra: Algebra, operand: Element, result: Element, where: str) -> Program:
-    """exp of B = f (u + v), u its rotation part: sin θ / |u| serves every component.
-
-    What is multiplied into the translation waits for no sine.
-    """
+    """exp of B = f (u + v), u its rotation part: sin θ / |u| serves every component."""
     plane, b, factor = _coordinates(algebra, operand, where)
     u = {blade: b[blade] for blade in plane.rotation}
     writer = Writer()
@@ -104,7 +101,8 @@ def _exp_program(algebra: Algebra, operand: Element, result: Element, where: str
             if factor == 1
             else MultiplyAdd(number(-factor), cosine, spin)
         )
-        share = Product(rest, Quotient(product, squares))
+        # In this order: of the smallest u the quotient of the other two is no number.
+        share = Quotient(Product(rest, product), squares)
         along = writer.let("along", Select(squares, share, ZERO))
         turned = axis_part(plane, u)
         for blade in plane.translation:
