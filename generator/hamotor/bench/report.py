@@ -31,7 +31,7 @@ _COLOURS = {
     "dense table": "#555555",
 }
 _HATCHES = {"g++": "", "clang++": "////"}
-_TICKS = (0.125, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64, 128)
+_TICKS = (0.0625, 0.125, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64, 128)
 
 Rows = Sequence[Mapping[str, Any]]
 
