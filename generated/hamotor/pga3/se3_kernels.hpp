@@ -233,7 +233,7 @@ template <class S>
 /// Relative error at most 4 ulp of the result's norm and ε² of the translation's, for half
 /// angles up to 1/(8 ε).
 /// By a shortcut for half angles up to π/2.
-/// Cost: 28 mul, 7 add (3 fused), 2 div, 1 compensated_dot, 1 compensated_dot_parts, 1
+/// Cost: 28 mul, 7 add (3 fused), 1 div, 2 compensated_dot_parts, 1 double_word_ratio, 1
 /// double_word_scaled, 1 double_word_sqrt_parts, 2 max_abs, 2 scaling, 3 select, 1 sin_cos; by the
 /// shortcut 23 mul, 12 add (10 fused), 2 div, 1 cos, 1 max_abs, 1 moderate, 2 select, 1 sin, 1
 /// sqrt.
@@ -284,9 +284,10 @@ template <class S>
     const S v_e01 = v_scaling.in * b_e01;
     const S v_e02 = v_scaling.in * b_e02;
     const S v_e03 = v_scaling.in * b_e03;
-    const S product = scalar::compensated_dot(w_e12, v_e03, -w_e13, v_e02, w_e23, v_e01);
-    const S square = squares.hi + squares.lo;
-    const S along = (sinc - turn.cos) * select(square > S(0), product / square, S(0));
+    const auto overlap = scalar::compensated_dot_parts(w_e12, v_e03, -w_e13, v_e02, w_e23, v_e01);
+    const S product = overlap.hi + overlap.lo;
+    const auto ratio = scalar::double_word_ratio(overlap, squares);
+    const S along = (sinc - turn.cos) * select(length > S(0), ratio.hi, S(0));
     return {.s = turn.cos,
             .e23 = spin * w_e23,
             .e31 = -spin * w_e13,

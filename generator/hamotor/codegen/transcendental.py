@@ -228,9 +228,11 @@ def exp_kernel(
     if plane.pitch:
         v = _scaled(writer, {v: b[v] for v in plane.translation}, "v", algebra)
         terms = [x for axis, blade in pitch_pairs(plane, w.values) for x in (axis, v.values[blade])]
-        product = writer.let("product", call("compensated_dot", *terms))
-        square = writer.let("square", Sum(Name("squares.hi"), Name("squares.lo")))
-        share = Select(square, Quotient(product, square), ZERO)
+        exact = writer.let("overlap", call("compensated_dot_parts", *terms))
+        product = writer.let("product", Sum(_part(exact, "hi"), _part(exact, "lo")))
+        # Far from θ = 0 the translation along the axis is mostly made of this.
+        writer.let("ratio", call("double_word_ratio", exact, Name("squares")))
+        share = Select(length, Name("ratio.hi"), ZERO)
         along = writer.let("along", Product(Sum(sinc, Negative(cosine)), share))
         axis = axis_part(plane, w.values)
         for blade in plane.translation:
