@@ -47,6 +47,17 @@ struct ConformalGenerated {
   [[nodiscard]] HAMOTOR_INLINE static auto exp(const cga3::Bivector<S>& b) { return cga3::exp(b); }
 };
 
+/// The sandwiches with the fewest operations, accurate as wholes and not component by component.
+template <class S>
+struct ConformalLean : ConformalGenerated<S> {
+  static constexpr const char* name = "generated, lean";
+
+  template <class Kind>
+  [[nodiscard]] HAMOTOR_INLINE static auto move(Kind, const cga3::Versor<S>& m, const auto& x) {
+    return sandwich_lean(m, x);
+  }
+};
+
 }  // namespace
 
 template <>
@@ -78,6 +89,10 @@ template Values reference<BivectorTrivector>(const cga3::Bivector<Quad>&,
 template Values reference<operation::conformal::Exp>(const kind::Nothing&,
                                                      const cga3::Bivector<Quad>&);
 
-void enter_conformal_generated() { enter_conformal<ConformalGenerated>(); }
+void enter_conformal_generated() {
+  enter_conformal<ConformalGenerated>();
+  enter_for<ConformalLean, MoveVector>();
+  enter_for<ConformalLean, MoveBivector>();
+}
 
 }  // namespace bench

@@ -531,7 +531,7 @@ void latency(benchmark::State& state) {
   state.SetItemsProcessed(static_cast<std::int64_t>(length) * state.iterations());
 }
 
-/// Time operations take over arrays of operands and results: how many times over, it says itself.
+/// The time of operations over arrays of operands and results; the argument says how many.
 template <class C, class Op>
 void over_arrays(benchmark::State& state, const std::vector<Held<C, typename Op::A>>& a,
                  const std::vector<Held<C, typename Op::B>>& b) {

@@ -163,6 +163,7 @@ class Library:
             "unit_defect_change": lambda m, x: added(o.gp(m, o.reverse(x)), o.gp(x, o.reverse(m))),
             "unit_correction": lambda m, d: scaled(Fraction(-1, 2), o.gp(d, m)),
             "sandwich": self.sandwich,
+            "sandwich_lean": self.sandwich,
             "transform": self.sandwich,
             "ad": self.bracket,
             "coadjoint": lambda w, mu: self.bracket(mu, w),
@@ -325,7 +326,7 @@ class Library:
             sums += [_random(dice, element) for _ in range(20)]
             return [(point,) for point in sums]
         choices: list[Sequence[Point]] = [element.basis() for element in operands]
-        if kernel["name"] in ("sandwich", "transform", "Ad", "Ad_star_inverse"):
+        if kernel["name"] in ("sandwich", "sandwich_lean", "transform", "Ad", "Ad_star_inverse"):
             choices[0] = self.versors(operands[0].name)
             extra = [(dice.choice(choices[0]), _random(dice, operands[1])) for _ in range(20)]
             return [*product(*choices), *extra]

@@ -132,7 +132,7 @@ def test_the_second_table_has_a_row_for_every_function_of_every_algebra() -> Non
         for kernel in conditioned.kernels(algebra):
             key = (kernel.name, algebra)
             counted[key] = counted.get(key, 0) + 1
-            bounds[key] = conditioned.BOUNDS[kernel.meaning is not None]
+            bounds[key] = conditioned.bound(kernel)
     assert {(name, algebra): int(n) for name, _, algebra, n, _, _ in rows} == counted
     for name, mark, algebra, _, *errors in rows:
         exceeds = max(map(float, errors)) > bounds[name, algebra]

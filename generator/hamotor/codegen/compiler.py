@@ -19,7 +19,7 @@ from hamotor.codegen import cpp, lanes
 from hamotor.codegen.algebra import Algebra, Blade
 from hamotor.codegen.element import Element
 from hamotor.codegen.group import LieGroup
-from hamotor.codegen.kernel import Kernel
+from hamotor.codegen.kernel import LEAN_SANDWICH, Kernel
 from hamotor.codegen.library import library
 from hamotor.codegen.program import Call, Cost, Program
 from hamotor.codegen.spec import AlgebraSpec
@@ -371,7 +371,7 @@ def _index(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
 def accuracy(kernel: Kernel) -> str:
     """What is promised of a kernel's error, in one or two words."""
     if kernel.meaning is not None:
-        return "polynomial"
+        return "polynomial, lean" if LEAN_SANDWICH[0] in kernel.notes else "polynomial"
     said = " ".join(kernel.notes)
     bound = re.search(r"at most (\d+) ulp", said)
     if said.startswith("Lean:"):

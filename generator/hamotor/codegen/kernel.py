@@ -7,10 +7,10 @@ does not mean what the algebra says cannot leave this module.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cache
+from functools import cache, partial
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import (
@@ -23,7 +23,7 @@ from hamotor.codegen.algebra import (
     reverse_sign,
 )
 from hamotor.codegen.element import Element
-from hamotor.codegen.nullsplit import hyperbolic_pairs, split_program
+from hamotor.codegen.nullsplit import SplitProduct, hyperbolic_pairs, split_products, split_program
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
 from hamotor.codegen.program import (
     Expression,
@@ -249,9 +249,10 @@ class Staging:
 
         def last(monomial: tuple[str, ...]) -> tuple[int, int]:
             own = sum(x in self._unbounded for x in monomial)
-            behind = [pair for x in monomial for pair in self._behind.get(x, ())] or [(0, 0)]
-            degree = own + max(degree for _, degree in behind)
-            return max(2 * count + degree + own for count, degree in behind), degree
+            behind = [self._behind.get(x, [(0, 0)]) for x in monomial]
+            degree = own + sum(max(degree for _, degree in pairs) for pairs in behind)
+            most = sum(max(2 * count + degree for count, degree in pairs) for pairs in behind)
+            return own + most, degree
 
         return {m: polynomial[m] for m in sorted(polynomial, key=last)}
 
@@ -338,6 +339,8 @@ def sandwich_kernel(
     operand: Element,
     result: Element,
     namespace: str = "",
+    *,
+    lean: bool = False,
 ) -> Kernel:
     """V X ~V for an even unit versor V, (−1)^k V X ~V for an odd one and X of grade k.
 
@@ -347,28 +350,24 @@ def sandwich_kernel(
     taken whose rounding errors are bounded by the terms of X + [V, X] ~V; of two that cost the same
     the one with 2 V, which is known before X.  The unit condition enters each exactly, as a
     multiple of 1 − V ~V, which the proof adds to the definition.
+
+    lean: the cheapest form in the basis A P± of a hyperbolic pair, with terms that cancel only
+    because V is a unit.  ValueError where no such form costs less than the other kernel.
     """
     v, x = parameters_for(versor, operand)
     odd = any(g % 2 for g in versor.grades)
     overall = -1 if odd and operand.grades[0] % 2 else 1
-    kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
-    forms: list[tuple[Program, SandwichForm, bool]] = []
-    for doubled in (True, False):
-        for kind, sign in kinds if odd else kinds[:1]:
-            form = _commutator_first(algebra, (v, x), kind, sign, doubled)
-            forms.append((_sandwich_program((v, x), result, overall, form), form, True))
-        last = None if odd else _commutator_last(algebra, (v, x), doubled)
-        if last is not None:
-            forms.append((_sandwich_program((v, x), result, overall, last), last, False))
+    ways = _sandwich_ways(algebra, (v, x), odd=odd)
 
-    @cache
-    def bounded() -> bool:
-        first = _commutator_first(algebra, (v, x), *kinds[0], doubled=False)
-        last = _commutator_last(algebra, (v, x), doubled=False)
-        return last is not None and _no_larger_terms(last, first, result)
+    def program_of(form: SandwichForm) -> Program:
+        return _sandwich_program((v, x), result, overall, form)
 
-    forms.sort(key=lambda one: one[0].cost.total)
-    program, form, _ = next(one for one in forms if one[2] or bounded())
+    (program, form), leanest = _chosen(ways, program_of, result)
+    if lean:
+        if leanest is None or leanest[0].cost.total >= program.cost.total:
+            raise ValueError(f"no form of {name} takes fewer operations than sandwich")
+        program, form = leanest
+    notes = LEAN_SANDWICH if lean else ()
     both = poly.apply_bilinear(
         algebra.geometric,
         poly.apply_bilinear(algebra.geometric, value_of(v), value_of(x)),
@@ -376,12 +375,16 @@ def sandwich_kernel(
     )
     defect = poly.added({0: ONE}, form.unit, -1)
     rest_of_unit = poly.apply_bilinear(algebra.geometric, value_of(x), defect)
-    meaning = {
-        n: poly.scaled(p, overall)
-        for n, p in read_off(poly.added(both, rest_of_unit, form.sign), result).items()
-    }
-    notes = (f"Needs M ~M = 1: computed as {form.note}.",)
+    moved = form.read(poly.added(both, rest_of_unit, form.sign))
+    meaning = {n: poly.scaled(p, overall) for n, p in read_off(moved, result).items()}
+    notes = (f"Needs M ~M = 1: computed as {form.note}.", *notes)
     return proved(Kernel(name, law, program, meaning, namespace, None, notes))
+
+
+LEAN_SANDWICH = (
+    "Lean: error at most 3 ulp of the terms of all components together.",
+    "A component that is small beside the others, or 0, may be rounding alone.",
+)
 
 
 @dataclass(frozen=True)
@@ -390,6 +393,7 @@ class SandwichForm:
 
     part:   over names that `staging` binds; half of the change, or all of it with 2 V in it.
     unit:   what is 1 where V is a unit: exactly, V X ~V + `sign` X (1 − unit) is computed.
+    split:  the product of `part` over A P± of a hyperbolic pair, where that is how it is made.
     """
 
     note: str
@@ -398,6 +402,80 @@ class SandwichForm:
     factor: int
     part: PolynomialMultivector
     unit: PolynomialMultivector
+    split: SplitProduct | None = None
+
+    def read(self, value: PolynomialMultivector) -> PolynomialMultivector:
+        """What is taken for a multivector that has the grades of X where V is a unit."""
+        return value if self.split is None else self.split.read(value)
+
+
+@dataclass(frozen=True)
+class _Way:
+    """A way to write a sandwich, given whether with 2 V, and that whose terms bound its errors."""
+
+    write: Callable[[bool], SandwichForm]
+    reference: Callable[[bool], SandwichForm]
+    split: bool = False
+
+
+def _sandwich_ways(
+    algebra: Algebra, parameters: tuple[Parameter, Parameter], *, odd: bool
+) -> list[_Way]:
+    _, operand = parameters
+    kinds = ((algebra.commutator, 1), (algebra.anticommutator, -1))
+    ways: list[_Way] = []
+    for kind, sign in kinds if odd else kinds[:1]:
+        first = partial(_commutator_first, algebra, parameters, kind, sign)
+        splits = split_products(algebra, operand.element.grades)
+        ways += [
+            _Way(first, first),
+            *(_Way(partial(first, split=split), first, split=True) for split in splits),
+        ]
+    if not odd and _has_commutator_last(algebra, value_of(operand)):
+        ways.append(_Way(partial(_commutator_last, algebra, parameters), ways[0].write))
+    return ways
+
+
+_Written = tuple[Program, SandwichForm]
+
+
+def _chosen(
+    ways: Iterable[_Way], program_of: Callable[[SandwichForm], Program], result: Element
+) -> tuple[_Written, _Written | None]:
+    """The cheapest form whose terms are bounded, and the cheapest over A P±, bounded or not.
+
+    The first is over A P± only where that saves a tenth of the instructions: each conversion is a
+    rounding more.
+    """
+
+    @cache
+    def sizes(write: Callable[[bool], SandwichForm]) -> Mapping[str, Polynomial]:
+        return _sizes(write(False), result)
+
+    def bounded(way: _Way) -> bool:
+        first = way.reference
+        return way.write is first or _no_larger_terms(sizes(way.write), sizes(first))
+
+    def written(way: _Way, doubled: bool) -> _Written:
+        form = way.write(doubled)
+        return program_of(form), form
+
+    def operations(one: _Written) -> int:
+        return one[0].cost.total
+
+    def cheaper(way: _Way) -> _Written:
+        return min(written(way, True), written(way, False), key=operations)
+
+    whole = [(cheaper(way), way) for way in ways if not way.split]
+    whole.sort(key=lambda pair: operations(pair[0]))
+    best = next(one for one, way in whole if bounded(way))
+    most = best[0].cost.instructions * 9 // 10
+    split = [(written(way, False), way) for way in ways if way.split]
+    split.sort(key=lambda pair: operations(pair[0]))
+    pays = (way for one, way in split if one[0].cost.instructions <= most and bounded(way))
+    if (way := next(pays, None)) is not None:
+        best = cheaper(way)
+    return best, cheaper(split[0][1]) if split else None
 
 
 def _sizes(form: SandwichForm, result: Element) -> Mapping[str, Polynomial]:
@@ -427,17 +505,16 @@ def _sizes(form: SandwichForm, result: Element) -> Mapping[str, Polynomial]:
     return sizes
 
 
-def _no_larger_terms(form: SandwichForm, other: SandwichForm, result: Element) -> bool:
-    """Whether no term of `form` is missing or smaller in the other form, whatever the numbers are.
+def _no_larger_terms(sizes: Mapping[str, Polynomial], allowed: Mapping[str, Polynomial]) -> bool:
+    """Whether no term of one form is missing or smaller in another, whatever the numbers are.
 
     A term may cancel only because V is a unit: the long translation of a screw along a line that
     it only turns is in such terms, and leaves its rounding error there.
     """
-    allowed = _sizes(other, result)
     return all(
         x <= allowed[component].get(monomial, 0)
-        for component, sizes in _sizes(form, result).items()
-        for monomial, x in sizes.items()
+        for component, terms in sizes.items()
+        for monomial, x in terms.items()
     )
 
 
@@ -473,34 +550,49 @@ def _commutator_first(
     kind: Callable[[Blade, Blade], Multivector],
     sign: int,
     doubled: bool,
+    split: SplitProduct | None = None,
 ) -> SandwichForm:
-    """V X ~V = X + [V, X] ~V = −X + {V, X} ~V: the (anti)commutator is multiplied by ~V."""
+    """V X ~V = X + [V, X] ~V = −X + {V, X} ~V: the (anti)commutator is multiplied by ~V.
+
+    split: how that product is made, if in the basis A P± of a hyperbolic pair.
+    """
     versor, value = (value_of(p) for p in parameters)
     left, staging = _twice(algebra, versor, doubled)
     moved = _bound(algebra, staging, "c", poly.apply_bilinear(kind, left, value))
     back = reversed_value(versor)
-    part = poly.apply_bilinear(algebra.geometric, moved, back)
     unit = poly.apply_bilinear(algebra.geometric, versor, back)
     form = "X + 2 (M × X) ~M" if sign > 0 else "−X + 2 ½(M X + X M) ~M"
-    return SandwichForm(form, sign, staging, 1 if doubled else 2, part, unit)
+    factor = 1 if doubled else 2
+    if split is None:
+        part = poly.apply_bilinear(algebra.geometric, moved, back)
+        return SandwichForm(form, sign, staging, factor, part, unit)
+    part = split.multiply(moved, back, ("c", parameters[0].name), staging.bind)
+    return SandwichForm(f"{form} {split}", sign, staging, factor, part, unit, split)
+
+
+def _null_vectors(algebra: Algebra) -> list[int]:
+    """The basis vectors that see nothing, themselves neither."""
+    return [i for i in range(algebra.dimension) if not any(algebra.gram[i])]
+
+
+def _has_commutator_last(algebra: Algebra, value: PolynomialMultivector) -> bool:
+    """Whether `_commutator_last` is there: X's grades agree in that sign, one vector at most is
+    null."""
+    return len(_null_vectors(algebra)) <= 1 and len({reverse_sign(b) for b in value}) == 1
 
 
 def _commutator_last(
     algebra: Algebra, parameters: tuple[Parameter, Parameter], doubled: bool
-) -> SandwichForm | None:
+) -> SandwichForm:
     """With V = R + D, D what contains the null vector e0 of a degenerate algebra, and Y = X ~R,
 
         V X ~V = R X ~R + D Y + (its reverse, of the sign of X's) = X + 2 (R × Y + <D Y>),
 
     where <…> keeps the grades whose reversal has X's sign.  Y is shared by both terms.
-    None where X's grades differ in that sign, or more than one vector is null and sees no other.
     """
     versor, value = (value_of(p) for p in parameters)
-    null = [i for i in range(algebra.dimension) if not any(algebra.gram[i])]
-    signs = {reverse_sign(b) for b in value}
-    if len(null) > 1 or len(signs) != 1:
-        return None
-    (sign,) = signs
+    null = _null_vectors(algebra)
+    (sign,) = {reverse_sign(b) for b in value}
     mask = sum(1 << i for i in null)
     turning = {b: p for b, p in versor.items() if not b & mask}
     moving = {b: p for b, p in versor.items() if b & mask}

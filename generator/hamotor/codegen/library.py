@@ -227,9 +227,15 @@ def request_kernel(spec: AlgebraSpec, request: Request) -> Kernel:
         unit = name == "gp" and left.unit and right.unit
         _keep_promise(algebra, value, result, where, unit=unit)
         return product_kernel(algebra, name, LAWS[name], product, left, right, result)
-    if request.operation == "sandwich":
+    if request.operation in ("sandwich", "sandwich_lean"):
         versor, operand, target, law = _moving(spec, request, where)
-        return sandwich_kernel(algebra, "sandwich", law, versor, operand, target)
+        lean_one = request.operation == "sandwich_lean"
+        try:
+            return sandwich_kernel(
+                algebra, request.operation, law, versor, operand, target, lean=lean_one
+            )
+        except ValueError as error:
+            raise UsageError(f"{where}: {error}; ask for that") from error
     if request.operation == "project":
         return _project(spec, operands, result, where)
     try:

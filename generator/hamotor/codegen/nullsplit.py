@@ -9,7 +9,8 @@ the change of basis is applied to any bilinear product, and the cost decides.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, Multivector, Rational, magnitude, ratio
@@ -59,7 +60,12 @@ def split_program(
     if not result.is_blades:
         return None
     bindings: list[tuple[str, Expression]] = []
-    values = [_split_value(algebra, pair, p.name, value, bindings) for p, value in operands]
+
+    def bind(name: str, p: Polynomial) -> Polynomial:
+        bindings.append((name, polynomial_expression(p)))
+        return {(name,): 1}
+
+    values = [split_value(algebra, pair, value, p.name, bind) for p, value in operands]
     turned = poly.apply_bilinear(product, *values)
     both = 1 << pair[0] | 1 << pair[1]
     outputs: dict[str, Expression] = {}
@@ -117,14 +123,14 @@ def _halved(p: Polynomial, factor: Rational) -> Expression:
     )
 
 
-def _split_value(
+def split_value(
     algebra: Algebra,
     pair: tuple[int, int],
-    prefix: str,
     value: Mapping[Blade, Polynomial],
-    bindings: list[tuple[str, Expression]],
+    prefix: str,
+    bind: Callable[[str, Polynomial], Polynomial],
 ) -> PolynomialMultivector:
-    """The same multivector over named sums and differences of its coefficients."""
+    """The same multivector over sums and differences of its coefficients, which `bind` names."""
     both = 1 << pair[0] | 1 << pair[1]
     result: PolynomialMultivector = {}
     for blade, p in value.items():
@@ -137,9 +143,7 @@ def _split_value(
             total: Polynomial = dict(value.get(blade, {}))
             poly.add_scaled(total, value.get(other, {}), ratio(direction, sign))
             if len(total) > 1:
-                name = f"{prefix}_{half}_{algebra.blade_name(blade)}"
-                bindings.append((name, polynomial_expression(total)))
-                total = {(name,): 1}
+                total = bind(f"{prefix}_{half}_{algebra.blade_name(blade)}", total)
             parts[direction] = total
         plus, minus = parts[1], parts[-1]
         for target, sum_sign, scale in ((blade, 1, 1), (other, -1, sign)):
@@ -149,3 +153,66 @@ def _split_value(
             if mixed:
                 result[target] = mixed
     return result
+
+
+@dataclass(frozen=True)
+class SplitProduct:
+    """A geometric product over A P±, of which only certain grades are wanted.
+
+    Of A and A E a result may want one alone, as a bivector does: its coefficient of A P+ is then
+    that of A, and that of A P− as well, if the other is 0.  side: +1 or −1, on which of the two it
+    is read off, for half of the operations; or 0: it is multiplied out as in the given basis, so
+    that no term is added that must cancel.
+    """
+
+    algebra: Algebra
+    pair: tuple[int, int]
+    side: int
+    grades: frozenset[int]
+
+    def __str__(self) -> str:
+        """How the product is made, for a kernel's documentation."""
+        n, m = (self.algebra.basis[i] for i in self.pair)
+        return f"multiplied out in A P±, P± = ½(1 ± {n}∧{m}/{n}·{m})"
+
+    def multiply(
+        self,
+        left: PolynomialMultivector,
+        right: PolynomialMultivector,
+        prefixes: tuple[str, str],
+        bind: Callable[[str, Polynomial], Polynomial],
+    ) -> PolynomialMultivector:
+        """The product, over sums and differences of coefficients that `bind` names."""
+        sides = [
+            split_value(self.algebra, self.pair, value, prefix, bind)
+            for value, prefix in zip((left, right), prefixes, strict=True)
+        ]
+        split = self.read(poly.apply_bilinear(self.algebra.geometric, *sides))
+        if self.side:
+            return split
+        given = poly.apply_bilinear(self.algebra.geometric, left, right)
+        both = self._both
+        return {b: (given if b & both in (0, both) else split).get(b, {}) for b in given}
+
+    def read(self, value: Mapping[Blade, Polynomial]) -> PolynomialMultivector:
+        """The wanted grades of a multivector, read off on this side."""
+        result = {b: dict(p) for b, p in value.items() if b.bit_count() in self.grades}
+        for blade in {b & ~self._both for b in value if b & self._both in (0, self._both)}:
+            other, sign = _times_pair(self.algebra, self.pair, blade)
+            ends = [b for b in (blade, other) if b.bit_count() in self.grades]
+            if self.side and len(ends) == 1:
+                zero, scale = (other, ratio(1, sign)) if ends == [blade] else (blade, sign)
+                total = result.setdefault(ends[0], {})
+                poly.add_scaled(total, value.get(zero, {}), self.side * scale)
+        return result
+
+    @property
+    def _both(self) -> Blade:
+        return 1 << self.pair[0] | 1 << self.pair[1]
+
+
+def split_products(algebra: Algebra, grades: Iterable[int]) -> list[SplitProduct]:
+    """Those of every hyperbolic pair."""
+    wanted = frozenset(grades)
+    pairs = hyperbolic_pairs(algebra)
+    return [SplitProduct(algebra, pair, side, wanted) for pair in pairs for side in (0, 1, -1)]

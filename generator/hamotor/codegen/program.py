@@ -139,6 +139,11 @@ class Cost:
         """Multiplications, additions and divisions together."""
         return self.mul + self.add + self.div
 
+    @property
+    def instructions(self) -> int:
+        """The same where a multiply-add is one."""
+        return self.total - self.fused
+
     def __str__(self) -> str:
         """For a header: `48 mul, 40 add (40 fused)`."""
         parts = [f"{self.mul} mul", f"{self.add} add"]

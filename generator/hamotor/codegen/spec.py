@@ -35,6 +35,7 @@ OPERATIONS = {
     "commutator": 2,
     "anticommutator": 2,
     "sandwich": 2,
+    "sandwich_lean": 2,
     "matrix": 2,
     "project": 2,
     "reverse": 1,

@@ -80,7 +80,7 @@ def _kernel(kernel: Kernel) -> dict[str, Any]:
 def _test(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
     shared = [k for k in kernels if not k.namespace]
     bilinear = [_kernel(k) for k in shared if k.name in LAWS and _is_storable(k)]
-    sandwiches = [_kernel(k) for k in shared if k.name == "sandwich"]
+    sandwiches = [_kernel(k) for k in shared if k.name.startswith("sandwich")]
     used = {
         name
         for k in bilinear + sandwiches
