@@ -210,6 +210,7 @@ def test_a_wrong_group_is_named(old: str, new: str, message: str) -> None:
         ('gp = ["Vector Vector"]', "no element type holds the result"),
         ('outer = ["Vector Bivector"]', None),
         ('sandwich = ["Vector Vector"]', "Vector must be a unit versor"),
+        ('sandwich_lean = ["Rotor Vector"]', "no form of sandwich_lean takes fewer operations"),
         ('exp = ["Bivector"]', 'name the result, as in "exp Bivector -> Motor"'),
         ('exp = ["Vector -> Rotor"]', "Vector is not a bivector"),
         ('grade = ["Rotor 2 3"]', "must be 1 element name"),
