@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hamotor.codegen import bundled_algebras, read_algebra
+from hamotor.codegen import bundled_algebras, cpp, read_algebra
 from hamotor.codegen.kernel import Kernel, proved
 from hamotor.codegen.lanes import packed_lines
 from hamotor.codegen.library import library
@@ -316,14 +316,14 @@ def test_the_page_lists_every_kernel_with_its_cost() -> None:
 
 def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
     packed = {
-        title(algebra, kernel): packed_lines(kernel.program)
+        title(algebra, kernel): packed_lines(kernel.program, whole=False)
         for algebra, kernel in KERNELS
         if kernel.name == "gp" and algebra in ("cga3", "pga3")
     }
     lines = packed["cga3 gp Even Even"]
     assert lines is not None
     assert sum(line.startswith("const auto sum") for line in lines) == 4
-    assert "const auto four_b_e01 = lanes::load<S, 12>(b);" in lines
+    assert "const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);" in lines
     both = "turned<1, 2, -3, 4>(sum1) + turned<1, 2, -3, 4>(sum2)"
     assert f"lanes::store<0>(result, {both});" in lines
     difference = "turned<1, 2, -3, 4>(sum2) - turned<1, 2, -3, 4>(sum1)"
@@ -335,3 +335,43 @@ def test_sums_of_four_agreeing_components_are_packed_in_their_order() -> None:
     assert lines is not None
     halves = "four(S(-0.5), S(-0.5), S(0.5), S(-0.5)) * (sum1 - sum2)"
     assert f"lanes::store<8>(result, {halves});" in lines
+    lines = packed["pga3 gp Motor Motor"]
+    assert lines is not None
+    assert "lanes::store<4>(result, sum2);" in lines, "what is computed last is not turned as well"
+
+
+def test_small_kernels_are_packed_where_no_component_is_left_over() -> None:
+    partly = {
+        title(algebra, kernel): kernel.program
+        for algebra, kernel in KERNELS
+        if kernel.name == "gp" and algebra == "pga3"
+    }["pga3 gp Bivector Motor"]
+    assert packed_lines(partly, whole=False) is not None
+    assert packed_lines(partly, whole=True) is None
+
+
+@pytest.mark.parametrize("algebra", ["pga2", "pga3", "pga4"])
+def test_a_product_adds_the_second_operands_translation_last(algebra: str) -> None:
+    (product,) = [
+        kernel
+        for name, kernel in KERNELS
+        if name == algebra
+        and kernel.name == "gp"
+        and [e.cpp_name for e in kernel.operands] == ["Motor", "Motor"]
+    ]
+    mixed = 0
+    for _, expression in product.program.outputs:
+        late = ["b.e0" in cpp.expression_text(b) for _, b in factors(expression)]
+        assert late == sorted(late)
+        mixed += len(set(late)) == 2
+    assert mixed > 0
+
+
+def factors(expression: Expression) -> list[tuple[Expression, Expression]]:
+    """The factors of a sum of products, in its order."""
+    later: list[tuple[Expression, Expression]] = []
+    while isinstance(expression, MultiplyAdd):
+        later.append((expression.a, expression.b))
+        expression = expression.c
+    assert isinstance(expression, Product)
+    return [(expression.a, expression.b), *reversed(later)]

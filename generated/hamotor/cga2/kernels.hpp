@@ -81,8 +81,8 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& a, const Motor<S>& b) noexcept {
   return {.s = dot(a.s, b.s, -a.e12, b.e12),
           .e12 = dot(a.s, b.e12, a.e12, b.s),
-          .e1i = dot(a.s, b.e1i, a.e12, b.e2i, a.e1i, b.s, -a.e2i, b.e12),
-          .e2i = dot(a.s, b.e2i, -a.e12, b.e1i, a.e1i, b.e12, a.e2i, b.s)};
+          .e1i = dot(a.e1i, b.s, -a.e2i, b.e12, a.s, b.e1i, a.e12, b.e2i),
+          .e2i = dot(a.e1i, b.e12, a.e2i, b.s, a.s, b.e2i, -a.e12, b.e1i)};
 }
 
 /// gp: Even Even -> Even
@@ -121,10 +121,10 @@ template <class S>
 /// Cost: 16 mul, 9 add (8 fused).  Sparsity: 14 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Vector<S>& a, const Vector<S>& b) noexcept {
-  return {.s = dot(-a.e0, b.ei, a.e1, b.e1, a.e2, b.e2, -a.ei, b.e0),
+  return {.s = dot(a.e1, b.e1, a.e2, b.e2, -a.e0, b.ei, -a.ei, b.e0),
           .e12 = dot(a.e1, b.e2, -a.e2, b.e1),
-          .e1i = dot(a.e1, b.ei, -a.ei, b.e1),
-          .e2i = dot(a.e2, b.ei, -a.ei, b.e2),
+          .e1i = dot(-a.ei, b.e1, a.e1, b.ei),
+          .e2i = dot(-a.ei, b.e2, a.e2, b.ei),
           .e0i = dot(a.e0, b.ei, -a.ei, b.e0),
           .e012i = S(0),
           .e01 = dot(a.e0, b.e1, -a.e1, b.e0),
@@ -160,16 +160,16 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Bivector<S>& a,
                                                   const Bivector<S>& b) noexcept {
-  return {.s = dot(-a.e12, b.e12, -a.e1i, b.e01, -a.e2i, b.e02, a.e0i, b.e0i, -a.e01, b.e1i, -a.e02,
+  return {.s = dot(-a.e12, b.e12, a.e0i, b.e0i, -a.e1i, b.e01, -a.e2i, b.e02, -a.e01, b.e1i, -a.e02,
                    b.e2i),
           .e12 = dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02, b.e1i),
-          .e1i = dot(a.e12, b.e2i, -a.e1i, b.e0i, -a.e2i, b.e12, a.e0i, b.e1i),
-          .e2i = dot(-a.e12, b.e1i, a.e1i, b.e12, -a.e2i, b.e0i, a.e0i, b.e2i),
+          .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e12, b.e2i, a.e0i, b.e1i),
+          .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e12, b.e1i, a.e0i, b.e2i),
           .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, a.e01, b.e1i, a.e02, b.e2i),
-          .e012i = dot(a.e12, b.e0i, -a.e1i, b.e02, a.e2i, b.e01, a.e0i, b.e12, a.e01, b.e2i,
+          .e012i = dot(a.e12, b.e0i, a.e0i, b.e12, -a.e1i, b.e02, a.e2i, b.e01, a.e01, b.e2i,
                        -a.e02, b.e1i),
-          .e01 = dot(a.e12, b.e02, -a.e0i, b.e01, a.e01, b.e0i, -a.e02, b.e12),
-          .e02 = dot(-a.e12, b.e01, -a.e0i, b.e02, a.e01, b.e12, a.e02, b.e0i)};
+          .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e12, b.e02, -a.e0i, b.e01),
+          .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e12, b.e01, -a.e0i, b.e02)};
 }
 
 /// outer: Vector Vector -> Bivector
@@ -179,8 +179,8 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> outer(const Vector<S>& a,
                                                          const Vector<S>& b) noexcept {
   return {.e12 = dot(a.e1, b.e2, -a.e2, b.e1),
-          .e1i = dot(a.e1, b.ei, -a.ei, b.e1),
-          .e2i = dot(a.e2, b.ei, -a.ei, b.e2),
+          .e1i = dot(-a.ei, b.e1, a.e1, b.ei),
+          .e2i = dot(-a.ei, b.e2, a.e2, b.ei),
           .e0i = dot(a.e0, b.ei, -a.ei, b.e0),
           .e01 = dot(a.e0, b.e1, -a.e1, b.e0),
           .e02 = dot(a.e0, b.e2, -a.e2, b.e0)};
@@ -192,10 +192,10 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> outer(const Bivector<S>& b,
                                                           const Vector<S>& v) noexcept {
-  return {.e012 = dot(b.e12, v.e0, b.e01, v.e2, -b.e02, v.e1),
-          .e01i = dot(b.e1i, v.e0, -b.e0i, v.e1, b.e01, v.ei),
-          .e02i = dot(b.e2i, v.e0, -b.e0i, v.e2, b.e02, v.ei),
-          .e12i = dot(b.e12, v.ei, -b.e1i, v.e2, b.e2i, v.e1)};
+  return {.e012 = dot(b.e01, v.e2, -b.e02, v.e1, b.e12, v.e0),
+          .e01i = dot(-b.e0i, v.e1, b.e1i, v.e0, b.e01, v.ei),
+          .e02i = dot(-b.e0i, v.e2, b.e2i, v.e0, b.e02, v.ei),
+          .e12i = dot(-b.e1i, v.e2, b.e2i, v.e1, b.e12, v.ei)};
 }
 
 /// outer: Trivector Vector -> Pseudoscalar
@@ -204,7 +204,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Trivector<S>& t,
                                                              const Vector<S>& v) noexcept {
-  return {.e012i = dot(t.e012, v.ei, -t.e01i, v.e2, t.e02i, v.e1, -t.e12i, v.e0)};
+  return {.e012i = dot(-t.e01i, v.e2, t.e02i, v.e1, t.e012, v.ei, -t.e12i, v.e0)};
 }
 
 /// outer: Bivector Bivector -> Pseudoscalar
@@ -213,7 +213,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Bivector<S>& a,
                                                              const Bivector<S>& b) noexcept {
-  return {.e012i = dot(a.e12, b.e0i, -a.e1i, b.e02, a.e2i, b.e01, a.e0i, b.e12, a.e01, b.e2i,
+  return {.e012i = dot(a.e12, b.e0i, a.e0i, b.e12, -a.e1i, b.e02, a.e2i, b.e01, a.e01, b.e2i,
                        -a.e02, b.e1i)};
 }
 
@@ -224,8 +224,8 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> regressive(const Trivector<S>& a,
                                                               const Trivector<S>& b) noexcept {
   return {.e12 = dot(a.e012, b.e12i, -a.e12i, b.e012),
-          .e1i = dot(a.e01i, b.e12i, -a.e12i, b.e01i),
-          .e2i = dot(a.e02i, b.e12i, -a.e12i, b.e02i),
+          .e1i = dot(-a.e12i, b.e01i, a.e01i, b.e12i),
+          .e2i = dot(-a.e12i, b.e02i, a.e02i, b.e12i),
           .e0i = dot(a.e01i, b.e02i, -a.e02i, b.e01i),
           .e01 = dot(a.e012, b.e01i, -a.e01i, b.e012),
           .e02 = dot(a.e012, b.e02i, -a.e02i, b.e012)};
@@ -238,9 +238,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> regressive(const Trivector<S>& t,
                                                             const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, t.e012, -b.e02, t.e01i, b.e01, t.e02i),
-          .e1 = dot(b.e1i, t.e012, -b.e12, t.e01i, b.e01, t.e12i),
-          .e2 = dot(b.e2i, t.e012, -b.e12, t.e02i, b.e02, t.e12i),
-          .ei = dot(b.e2i, t.e01i, -b.e1i, t.e02i, b.e0i, t.e12i)};
+          .e1 = dot(-b.e12, t.e01i, b.e1i, t.e012, b.e01, t.e12i),
+          .e2 = dot(-b.e12, t.e02i, b.e2i, t.e012, b.e02, t.e12i),
+          .ei = dot(b.e0i, t.e12i, b.e2i, t.e01i, -b.e1i, t.e02i)};
 }
 
 /// inner: Vector Vector -> Scalar
@@ -248,7 +248,7 @@ template <class S>
 /// Cost: 4 mul, 3 add (2 fused).  Sparsity: 4 of 16 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S inner(const Vector<S>& a, const Vector<S>& b) noexcept {
-  return dot(-a.e0, b.ei, a.e1, b.e1, a.e2, b.e2, -a.ei, b.e0);
+  return dot(a.e1, b.e1, a.e2, b.e2, -a.e0, b.ei, -a.ei, b.e0);
 }
 
 /// inner: Vector Bivector -> Vector
@@ -258,9 +258,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> inner(const Vector<S>& v,
                                                        const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e02, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, b.e2i, v.e0, -b.e02, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2)};
 }
 
 /// inner: Bivector Bivector -> Scalar
@@ -269,7 +269,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S inner(const Bivector<S>& a,
                                                const Bivector<S>& b) noexcept {
-  return dot(-a.e12, b.e12, -a.e1i, b.e01, -a.e2i, b.e02, a.e0i, b.e0i, -a.e01, b.e1i, -a.e02,
+  return dot(-a.e12, b.e12, a.e0i, b.e0i, -a.e1i, b.e01, -a.e2i, b.e02, -a.e01, b.e1i, -a.e02,
              b.e2i);
 }
 
@@ -280,9 +280,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> left_contraction(const Vector<S>& v,
                                                                   const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e02, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, b.e2i, v.e0, -b.e02, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2)};
 }
 
 /// left_contraction: Vector Trivector -> Bivector
@@ -292,8 +292,8 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> left_contraction(
     const Vector<S>& v, const Trivector<S>& t) noexcept {
   return {.e12 = dot(-t.e12i, v.e0, -t.e012, v.ei),
-          .e1i = dot(-t.e12i, v.e2, -t.e01i, v.ei),
-          .e2i = dot(t.e12i, v.e1, -t.e02i, v.ei),
+          .e1i = dot(-t.e01i, v.ei, -t.e12i, v.e2),
+          .e2i = dot(-t.e02i, v.ei, t.e12i, v.e1),
           .e0i = dot(-t.e01i, v.e1, -t.e02i, v.e2),
           .e01 = dot(-t.e01i, v.e0, t.e012, v.e2),
           .e02 = dot(-t.e02i, v.e0, -t.e012, v.e1)};
@@ -306,11 +306,11 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> commutator(const Bivector<S>& a,
                                                               const Bivector<S>& b) noexcept {
   return {.e12 = dot(-a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02, b.e1i),
-          .e1i = dot(a.e12, b.e2i, -a.e1i, b.e0i, -a.e2i, b.e12, a.e0i, b.e1i),
-          .e2i = dot(-a.e12, b.e1i, a.e1i, b.e12, -a.e2i, b.e0i, a.e0i, b.e2i),
+          .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e12, b.e2i, a.e0i, b.e1i),
+          .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e12, b.e1i, a.e0i, b.e2i),
           .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, a.e01, b.e1i, a.e02, b.e2i),
-          .e01 = dot(a.e12, b.e02, -a.e0i, b.e01, a.e01, b.e0i, -a.e02, b.e12),
-          .e02 = dot(-a.e12, b.e01, -a.e0i, b.e02, a.e01, b.e12, a.e02, b.e0i)};
+          .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e12, b.e02, -a.e0i, b.e01),
+          .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e12, b.e01, -a.e0i, b.e02)};
 }
 
 /// commutator: Vector Bivector -> Vector
@@ -320,9 +320,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> commutator(const Vector<S>& v,
                                                             const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e02, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, b.e2i, v.e0, -b.e02, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2)};
 }
 
 /// sandwich: Versor Vector -> Vector

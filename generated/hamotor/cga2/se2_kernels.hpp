@@ -22,7 +22,7 @@ using hamotor::select;
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se2::Rate<S> ad(const se2::Rate<S>& a,
                                                        const se2::Rate<S>& b) noexcept {
-  return {.w12 = S(0), .v1 = dot(-a.w12, b.v2, a.v2, b.w12), .v2 = dot(a.w12, b.v1, -a.v1, b.w12)};
+  return {.w12 = S(0), .v1 = dot(a.v2, b.w12, -a.w12, b.v2), .v2 = dot(-a.v1, b.w12, a.w12, b.v1)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
@@ -45,8 +45,8 @@ template <class S>
   const S half_v2 = S(0.5) * w.v2;
   return {.s = half_w12 * m.e12,
           .e12 = -half_w12 * m.s,
-          .e1i = dot(-half_v1, m.s, -half_v2, m.e12, half_w12, m.e2i),
-          .e2i = dot(-half_v2, m.s, half_v1, m.e12, -half_w12, m.e1i)};
+          .e1i = dot(half_w12, m.e2i, -half_v1, m.s, -half_v2, m.e12),
+          .e2i = dot(-half_w12, m.e1i, -half_v2, m.s, half_v1, m.e12)};
 }
 
 /// Ad: Motor Rate -> Rate

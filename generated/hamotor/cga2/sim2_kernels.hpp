@@ -25,8 +25,8 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr sim2::Rate<S> ad(const sim2::Rate<S>& a,
                                                         const sim2::Rate<S>& b) noexcept {
   return {.w12 = S(0),
-          .v1 = dot(-a.w12, b.v2, -a.v1, b.d, a.v2, b.w12, a.d, b.v1),
-          .v2 = dot(a.w12, b.v1, -a.v1, b.w12, -a.v2, b.d, a.d, b.v2),
+          .v1 = dot(-a.v1, b.d, a.v2, b.w12, -a.w12, b.v2, a.d, b.v1),
+          .v2 = dot(-a.v1, b.w12, -a.v2, b.d, a.w12, b.v1, a.d, b.v2),
           .d = S(0)};
 }
 
@@ -54,9 +54,9 @@ template <class S>
   const S half_d = S(0.5) * w.d;
   return {.s = dot(half_w12, m.e12, half_d, m.e0i),
           .e12 = dot(-half_w12, m.s, half_d, m.e012i),
-          .e1i = dot(-half_v1, m.s, -half_v2, m.e12, -half_d, m.e1i, half_w12, m.e2i, -half_v1,
+          .e1i = dot(-half_d, m.e1i, half_w12, m.e2i, -half_v1, m.s, -half_v2, m.e12, -half_v1,
                      m.e0i, -half_v2, m.e012i),
-          .e2i = dot(-half_v2, m.s, half_v1, m.e12, -half_w12, m.e1i, -half_d, m.e2i, -half_v2,
+          .e2i = dot(-half_w12, m.e1i, -half_d, m.e2i, -half_v2, m.s, half_v1, m.e12, -half_v2,
                      m.e0i, half_v1, m.e012i),
           .e0i = dot(half_d, m.s, half_w12, m.e012i),
           .e012i = dot(half_d, m.e12, -half_w12, m.e0i)};

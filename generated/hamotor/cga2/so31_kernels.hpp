@@ -25,11 +25,11 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so31::Rate<S> ad(const so31::Rate<S>& a,
                                                         const so31::Rate<S>& b) noexcept {
   return {.w12 = dot(a.v1, b.u2, -a.v2, b.u1, a.u1, b.v2, -a.u2, b.v1),
-          .v1 = dot(-a.w12, b.v2, -a.v1, b.d, a.v2, b.w12, a.d, b.v1),
-          .v2 = dot(a.w12, b.v1, -a.v1, b.w12, -a.v2, b.d, a.d, b.v2),
+          .v1 = dot(-a.v1, b.d, a.v2, b.w12, -a.w12, b.v2, a.d, b.v1),
+          .v2 = dot(-a.v1, b.w12, -a.v2, b.d, a.w12, b.v1, a.d, b.v2),
           .d = dot(-a.v1, b.u1, -a.v2, b.u2, a.u1, b.v1, a.u2, b.v2),
-          .u1 = dot(-a.w12, b.u2, -a.d, b.u1, a.u1, b.d, a.u2, b.w12),
-          .u2 = dot(a.w12, b.u1, -a.d, b.u2, -a.u1, b.w12, a.u2, b.d)};
+          .u1 = dot(a.u1, b.d, a.u2, b.w12, -a.w12, b.u2, -a.d, b.u1),
+          .u2 = dot(-a.u1, b.w12, a.u2, b.d, a.w12, b.u1, -a.d, b.u2)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
@@ -39,11 +39,11 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so31::Momentum<S> coadjoint(
     const so31::Rate<S>& w, const so31::Momentum<S>& mu) noexcept {
   return {.l12 = dot(-mu.p2, w.v1, mu.p1, w.v2, -mu.k2, w.u1, mu.k1, w.u2),
-          .p1 = dot(mu.p2, w.w12, mu.p1, w.d, mu.q, w.u1, -mu.l12, w.u2),
-          .p2 = dot(-mu.p1, w.w12, mu.p2, w.d, mu.l12, w.u1, mu.q, w.u2),
+          .p1 = dot(mu.q, w.u1, -mu.l12, w.u2, mu.p2, w.w12, mu.p1, w.d),
+          .p2 = dot(mu.l12, w.u1, mu.q, w.u2, -mu.p1, w.w12, mu.p2, w.d),
           .q = dot(-mu.p1, w.v1, -mu.p2, w.v2, mu.k1, w.u1, mu.k2, w.u2),
-          .k1 = dot(mu.k2, w.w12, -mu.q, w.v1, -mu.l12, w.v2, -mu.k1, w.d),
-          .k2 = dot(-mu.k1, w.w12, mu.l12, w.v1, -mu.q, w.v2, -mu.k2, w.d)};
+          .k1 = dot(-mu.q, w.v1, -mu.l12, w.v2, mu.k2, w.w12, -mu.k1, w.d),
+          .k2 = dot(mu.l12, w.v1, -mu.q, w.v2, -mu.k1, w.w12, -mu.k2, w.d)};
 }
 
 /// kinematics: Versor Rate -> Versor

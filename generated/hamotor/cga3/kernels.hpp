@@ -26,14 +26,14 @@ template <class S>
     if (!std::is_constant_evaluated()) {
       using lanes::four;
       using lanes::turned;
-      const auto four_b_e1i = lanes::load<S, 4>(b);
-      const auto four_b_s = lanes::load<S, 0>(b);
-      const auto four_b_e0i = lanes::load<S, 8>(b);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
       const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
-      const auto four_a_s = lanes::load<S, 0>(a);
-      const auto four_a_e0i = lanes::load<S, 8>(a);
+      const auto four_a_s = four(a.s, a.e23, a.e31, a.e12);
+      const auto four_a_e0i = four(a.e0i, a.e023i, a.e031i, a.e012i);
       const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
-      const auto four_b_e01 = lanes::load<S, 12>(b);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
       const auto sum1 =
@@ -151,15 +151,15 @@ template <class S>
     if (!std::is_constant_evaluated()) {
       using lanes::four;
       using lanes::turned;
-      const auto four_b_s = lanes::load<S, 0>(b);
-      const auto four_b_e0i = lanes::load<S, 8>(b);
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
       const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
-      const auto four_a_s = lanes::load<S, 0>(a);
-      const auto four_a_e0i = lanes::load<S, 8>(a);
+      const auto four_a_s = four(a.s, a.e23, a.e31, a.e12);
+      const auto four_a_e0i = four(a.e0i, a.e023i, a.e031i, a.e012i);
       const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
-      const auto four_b_e1i = lanes::load<S, 4>(b);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
       const auto sum1 = dot(lanes::each<0>(four_a_plus_s), four_b_plus_s,
                             lanes::each<3>(four_a_plus_s), turned<-4, -3, 2, 1>(four_b_plus_s),
                             lanes::each<2>(four_a_plus_s), turned<-3, 4, 1, -2>(four_b_plus_s),
@@ -168,16 +168,16 @@ template <class S>
                             lanes::each<3>(four_a_minus_s), turned<-4, -3, 2, 1>(four_b_minus_s),
                             lanes::each<2>(four_a_minus_s), turned<-3, 4, 1, -2>(four_b_minus_s),
                             lanes::each<1>(four_a_minus_s), turned<-2, 1, -4, 3>(four_b_minus_s));
-      const auto sum3 = dot(
-          four(a.e1i), four_b_plus_s, four(a.e2i), turned<-4, -3, 2, 1>(four_b_plus_s), four(a.e3i),
-          turned<-3, 4, 1, -2>(four_b_plus_s), four(a.e123i), turned<-2, 1, -4, 3>(four_b_plus_s),
-          lanes::each<0>(four_a_minus_s), turned<1, 4, 3, 2>(four_b_e1i),
-          lanes::each<3>(four_a_minus_s), turned<2, 3, -4, -1>(four_b_e1i),
-          lanes::each<2>(four_a_minus_s), turned<3, -2, -1, 4>(four_b_e1i),
-          lanes::each<1>(four_a_minus_s), turned<-4, 1, -2, 3>(four_b_e1i));
+      const auto sum3 =
+          dot(four(a.e1i), turned<1, 4, 3, 2>(four_b_plus_s), four(a.e2i),
+              turned<-4, 1, 2, -3>(four_b_plus_s), four(a.e3i), turned<-3, -2, 1, 4>(four_b_plus_s),
+              four(a.e123i), turned<-2, 3, -4, 1>(four_b_plus_s), lanes::each<0>(four_a_minus_s),
+              four_b_e1i, lanes::each<3>(four_a_minus_s), turned<2, -1, -4, 3>(four_b_e1i),
+              lanes::each<2>(four_a_minus_s), turned<3, 4, -1, -2>(four_b_e1i),
+              lanes::each<1>(four_a_minus_s), turned<-4, 3, -2, 1>(four_b_e1i));
       Similarity<S> result;
       lanes::store<0>(result, four(S(0.5), S(0.5), S(-0.5), S(0.5)) * (sum1 + sum2));
-      lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
+      lanes::store<4>(result, sum3);
       lanes::store<8>(result, four(S(-0.5), S(-0.5), S(0.5), S(-0.5)) * (sum1 - sum2));
       return result;
     }
@@ -238,18 +238,39 @@ template <class S>
 /// Cost: 48 mul, 40 add (32 fused).  Sparsity: 48 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& a, const Motor<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto sum1 =
+          dot(four(a.s), four_b_s, four(a.e23), turned<-2, 1, 4, -3>(four_b_s), four(a.e31),
+              turned<-3, -4, 1, 2>(four_b_s), four(a.e12), turned<-4, 3, -2, 1>(four_b_s));
+      const auto sum2 =
+          dot(four(a.e1i), turned<1, 4, -3, 2>(four_b_s), four(a.e2i),
+              turned<-4, 1, 2, 3>(four_b_s), four(a.e3i), turned<3, -2, 1, 4>(four_b_s),
+              four(a.e123i), turned<-2, -3, -4, 1>(four_b_s), four(a.s), four_b_e1i, four(a.e23),
+              turned<-4, 3, -2, 1>(four_b_e1i), four(a.e31), turned<-3, -4, 1, 2>(four_b_e1i),
+              four(a.e12), turned<2, -1, -4, 3>(four_b_e1i));
+      Motor<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, sum2);
+      return result;
+    }
+  }
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
           .e23 = dot(a.s, b.e23, a.e23, b.s, -a.e31, b.e12, a.e12, b.e31),
           .e31 = dot(a.s, b.e31, a.e23, b.e12, a.e31, b.s, -a.e12, b.e23),
           .e12 = dot(a.s, b.e12, -a.e23, b.e31, a.e31, b.e23, a.e12, b.s),
-          .e1i = dot(a.s, b.e1i, -a.e23, b.e123i, -a.e31, b.e3i, a.e12, b.e2i, a.e1i, b.s, -a.e2i,
-                     b.e12, a.e3i, b.e31, -a.e123i, b.e23),
-          .e2i = dot(a.s, b.e2i, a.e23, b.e3i, -a.e31, b.e123i, -a.e12, b.e1i, a.e1i, b.e12, a.e2i,
-                     b.s, -a.e3i, b.e23, -a.e123i, b.e31),
-          .e3i = dot(a.s, b.e3i, -a.e23, b.e2i, a.e31, b.e1i, -a.e12, b.e123i, -a.e1i, b.e31, a.e2i,
-                     b.e23, a.e3i, b.s, -a.e123i, b.e12),
-          .e123i = dot(a.s, b.e123i, a.e23, b.e1i, a.e31, b.e2i, a.e12, b.e3i, a.e1i, b.e23, a.e2i,
-                       b.e31, a.e3i, b.e12, a.e123i, b.s)};
+          .e1i = dot(a.e1i, b.s, -a.e2i, b.e12, a.e3i, b.e31, -a.e123i, b.e23, a.s, b.e1i, -a.e23,
+                     b.e123i, -a.e31, b.e3i, a.e12, b.e2i),
+          .e2i = dot(a.e1i, b.e12, a.e2i, b.s, -a.e3i, b.e23, -a.e123i, b.e31, a.s, b.e2i, a.e23,
+                     b.e3i, -a.e31, b.e123i, -a.e12, b.e1i),
+          .e3i = dot(-a.e1i, b.e31, a.e2i, b.e23, a.e3i, b.s, -a.e123i, b.e12, a.s, b.e3i, -a.e23,
+                     b.e2i, a.e31, b.e1i, -a.e12, b.e123i),
+          .e123i = dot(a.e1i, b.e23, a.e2i, b.e31, a.e3i, b.e12, a.e123i, b.s, a.s, b.e123i, a.e23,
+                       b.e1i, a.e31, b.e2i, a.e12, b.e3i)};
 }
 
 /// gp: Rotor Rotor -> Rotor
@@ -301,14 +322,14 @@ template <class S>
     if (!std::is_constant_evaluated()) {
       using lanes::four;
       using lanes::turned;
-      const auto four_b_e1i = lanes::load<S, 4>(b);
-      const auto four_b_s = lanes::load<S, 0>(b);
-      const auto four_b_e0i = lanes::load<S, 8>(b);
+      const auto four_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e123i);
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e0i = four(b.e0i, b.e023i, b.e031i, b.e012i);
       const auto four_b_plus_s = turned<1, 2, -3, 4>(four_b_s) - turned<1, 2, -3, 4>(four_b_e0i);
-      const auto four_a_s = lanes::load<S, 0>(a);
-      const auto four_a_e0i = lanes::load<S, 8>(a);
+      const auto four_a_s = four(a.s, a.e23, a.e31, a.e12);
+      const auto four_a_e0i = four(a.e0i, a.e023i, a.e031i, a.e012i);
       const auto four_a_plus_s = turned<1, 2, -3, 4>(four_a_s) - turned<1, 2, -3, 4>(four_a_e0i);
-      const auto four_b_e01 = lanes::load<S, 12>(b);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
       const auto four_b_minus_s = turned<1, 2, -3, 4>(four_b_s) + turned<1, 2, -3, 4>(four_b_e0i);
       const auto four_a_minus_s = turned<1, 2, -3, 4>(four_a_s) + turned<1, 2, -3, 4>(four_a_e0i);
       const auto sum1 =
@@ -422,13 +443,13 @@ template <class S>
 /// Cost: 25 mul, 14 add (13 fused).  Sparsity: 23 of 25 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Vector<S>& a, const Vector<S>& b) noexcept {
-  return {.s = dot(-a.e0, b.ei, a.e1, b.e1, a.e2, b.e2, a.e3, b.e3, -a.ei, b.e0),
+  return {.s = dot(a.e1, b.e1, a.e2, b.e2, a.e3, b.e3, -a.e0, b.ei, -a.ei, b.e0),
           .e23 = dot(a.e2, b.e3, -a.e3, b.e2),
           .e31 = dot(-a.e1, b.e3, a.e3, b.e1),
           .e12 = dot(a.e1, b.e2, -a.e2, b.e1),
-          .e1i = dot(a.e1, b.ei, -a.ei, b.e1),
-          .e2i = dot(a.e2, b.ei, -a.ei, b.e2),
-          .e3i = dot(a.e3, b.ei, -a.ei, b.e3),
+          .e1i = dot(-a.ei, b.e1, a.e1, b.ei),
+          .e2i = dot(-a.ei, b.e2, a.e2, b.ei),
+          .e3i = dot(-a.ei, b.e3, a.e3, b.ei),
           .e123i = S(0),
           .e0i = dot(a.e0, b.ei, -a.ei, b.e0),
           .e023i = S(0),
@@ -493,38 +514,38 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Bivector<S>& a, const Bivector<S>& b) noexcept {
   return {
-      .s = dot(-a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, -a.e1i, b.e01, -a.e2i, b.e02, -a.e3i,
-               b.e03, a.e0i, b.e0i, -a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i),
+      .s = dot(-a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, a.e0i, b.e0i, -a.e1i, b.e01, -a.e2i,
+               b.e02, -a.e3i, b.e03, -a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i),
       .e23 = dot(-a.e31, b.e12, a.e12, b.e31, -a.e2i, b.e03, a.e3i, b.e02, -a.e02, b.e3i, a.e03,
                  b.e2i),
       .e31 = dot(a.e23, b.e12, -a.e12, b.e23, a.e1i, b.e03, -a.e3i, b.e01, a.e01, b.e3i, -a.e03,
                  b.e1i),
       .e12 = dot(-a.e23, b.e31, a.e31, b.e23, -a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02,
                  b.e1i),
-      .e1i = dot(-a.e31, b.e3i, a.e12, b.e2i, -a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, a.e0i,
+      .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, -a.e31, b.e3i, a.e12, b.e2i, a.e0i,
                  b.e1i),
-      .e2i = dot(a.e23, b.e3i, -a.e12, b.e1i, a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e0i,
+      .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e23, b.e3i, -a.e12, b.e1i, a.e0i,
                  b.e2i),
-      .e3i = dot(-a.e23, b.e2i, a.e31, b.e1i, -a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, a.e0i,
+      .e3i = dot(-a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
                  b.e3i),
       .e123i =
-          dot(a.e23, b.e1i, a.e31, b.e2i, a.e12, b.e3i, a.e1i, b.e23, a.e2i, b.e31, a.e3i, b.e12),
+          dot(a.e1i, b.e23, a.e2i, b.e31, a.e3i, b.e12, a.e23, b.e1i, a.e31, b.e2i, a.e12, b.e3i),
       .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e01, b.e1i, a.e02, b.e2i, a.e03,
                  b.e3i),
       .e023i =
-          dot(a.e23, b.e0i, -a.e2i, b.e03, a.e3i, b.e02, a.e0i, b.e23, a.e02, b.e3i, -a.e03, b.e2i),
+          dot(a.e23, b.e0i, a.e0i, b.e23, -a.e2i, b.e03, a.e3i, b.e02, a.e02, b.e3i, -a.e03, b.e2i),
       .e031i =
-          dot(a.e31, b.e0i, a.e1i, b.e03, -a.e3i, b.e01, a.e0i, b.e31, -a.e01, b.e3i, a.e03, b.e1i),
+          dot(a.e31, b.e0i, a.e0i, b.e31, a.e1i, b.e03, -a.e3i, b.e01, -a.e01, b.e3i, a.e03, b.e1i),
       .e012i =
-          dot(a.e12, b.e0i, -a.e1i, b.e02, a.e2i, b.e01, a.e0i, b.e12, a.e01, b.e2i, -a.e02, b.e1i),
-      .e01 = dot(-a.e31, b.e03, a.e12, b.e02, -a.e0i, b.e01, a.e01, b.e0i, -a.e02, b.e12, a.e03,
-                 b.e31),
-      .e02 = dot(a.e23, b.e03, -a.e12, b.e01, -a.e0i, b.e02, a.e01, b.e12, a.e02, b.e0i, -a.e03,
-                 b.e23),
-      .e03 = dot(-a.e23, b.e02, a.e31, b.e01, -a.e0i, b.e03, -a.e01, b.e31, a.e02, b.e23, a.e03,
-                 b.e0i),
+          dot(a.e12, b.e0i, a.e0i, b.e12, -a.e1i, b.e02, a.e2i, b.e01, a.e01, b.e2i, -a.e02, b.e1i),
+      .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02, -a.e0i,
+                 b.e01),
+      .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01, -a.e0i,
+                 b.e02),
+      .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.e0i, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
+                 b.e03),
       .e0123 =
-          dot(a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02, b.e31, a.e03, b.e12)};
+          dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e23, b.e01, a.e31, b.e02, a.e12, b.e03)};
 }
 
 /// gp: Bivector Trivector -> Odd
@@ -532,39 +553,38 @@ template <class S>
 /// Cost: 100 mul, 84 add (66 fused).  Sparsity: 82 of 100 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Odd<S> gp(const Bivector<S>& b, const Trivector<S>& t) noexcept {
-  return {
-      .e0 = dot(-b.e23, t.e023, -b.e31, t.e031, -b.e12, t.e012, -b.e01, t.e01i, -b.e02, t.e02i,
-                -b.e03, t.e03i),
-      .e1 = dot(-b.e23, t.e123, b.e2i, t.e012, -b.e3i, t.e031, -b.e0i, t.e01i, -b.e02, t.e12i,
-                b.e03, t.e31i),
-      .e2 = dot(-b.e31, t.e123, -b.e1i, t.e012, b.e3i, t.e023, -b.e0i, t.e02i, b.e01, t.e12i,
-                -b.e03, t.e23i),
-      .e3 = dot(-b.e12, t.e123, b.e1i, t.e031, -b.e2i, t.e023, -b.e0i, t.e03i, -b.e01, t.e31i,
-                b.e02, t.e23i),
-      .ei = dot(-b.e23, t.e23i, -b.e31, t.e31i, -b.e12, t.e12i, -b.e1i, t.e01i, -b.e2i, t.e02i,
-                -b.e3i, t.e03i),
-      .e023 = dot(-b.e31, t.e012, b.e12, t.e031, -b.e0i, t.e023, b.e01, t.e123, -b.e02, t.e03i,
-                  b.e03, t.e02i),
-      .e031 = dot(b.e23, t.e012, -b.e12, t.e023, -b.e0i, t.e031, b.e01, t.e03i, b.e02, t.e123,
-                  -b.e03, t.e01i),
-      .e012 = dot(-b.e23, t.e031, b.e31, t.e023, -b.e0i, t.e012, -b.e01, t.e02i, b.e02, t.e01i,
-                  b.e03, t.e123),
-      .e123 = dot(-b.e1i, t.e023, -b.e2i, t.e031, -b.e3i, t.e012, b.e01, t.e23i, b.e02, t.e31i,
-                  b.e03, t.e12i),
-      .e01i = dot(-b.e31, t.e03i, b.e12, t.e02i, -b.e2i, t.e012, b.e3i, t.e031, -b.e02, t.e12i,
-                  b.e03, t.e31i),
-      .e02i = dot(b.e23, t.e03i, -b.e12, t.e01i, b.e1i, t.e012, -b.e3i, t.e023, b.e01, t.e12i,
-                  -b.e03, t.e23i),
-      .e03i = dot(-b.e23, t.e02i, b.e31, t.e01i, -b.e1i, t.e031, b.e2i, t.e023, -b.e01, t.e31i,
-                  b.e02, t.e23i),
-      .e23i = dot(-b.e31, t.e12i, b.e12, t.e31i, -b.e1i, t.e123, -b.e2i, t.e03i, b.e3i, t.e02i,
-                  b.e0i, t.e23i),
-      .e31i = dot(b.e23, t.e12i, -b.e12, t.e23i, b.e1i, t.e03i, -b.e2i, t.e123, -b.e3i, t.e01i,
-                  b.e0i, t.e31i),
-      .e12i = dot(-b.e23, t.e31i, b.e31, t.e23i, -b.e1i, t.e02i, b.e2i, t.e01i, -b.e3i, t.e123,
-                  b.e0i, t.e12i),
-      .e0123i = dot(b.e23, t.e01i, b.e31, t.e02i, b.e12, t.e03i, b.e1i, t.e023, b.e2i, t.e031,
-                    b.e3i, t.e012, -b.e0i, t.e123, b.e01, t.e23i, b.e02, t.e31i, b.e03, t.e12i)};
+  return {.e0 = dot(-b.e01, t.e01i, -b.e02, t.e02i, -b.e03, t.e03i, -b.e23, t.e023, -b.e31, t.e031,
+                    -b.e12, t.e012),
+          .e1 = dot(-b.e23, t.e123, -b.e0i, t.e01i, b.e2i, t.e012, -b.e3i, t.e031, -b.e02, t.e12i,
+                    b.e03, t.e31i),
+          .e2 = dot(-b.e31, t.e123, -b.e0i, t.e02i, -b.e1i, t.e012, b.e3i, t.e023, b.e01, t.e12i,
+                    -b.e03, t.e23i),
+          .e3 = dot(-b.e12, t.e123, -b.e0i, t.e03i, b.e1i, t.e031, -b.e2i, t.e023, -b.e01, t.e31i,
+                    b.e02, t.e23i),
+          .ei = dot(-b.e1i, t.e01i, -b.e2i, t.e02i, -b.e3i, t.e03i, -b.e23, t.e23i, -b.e31, t.e31i,
+                    -b.e12, t.e12i),
+          .e023 = dot(b.e01, t.e123, -b.e02, t.e03i, b.e03, t.e02i, -b.e31, t.e012, b.e12, t.e031,
+                      -b.e0i, t.e023),
+          .e031 = dot(b.e01, t.e03i, b.e02, t.e123, -b.e03, t.e01i, b.e23, t.e012, -b.e12, t.e023,
+                      -b.e0i, t.e031),
+          .e012 = dot(-b.e01, t.e02i, b.e02, t.e01i, b.e03, t.e123, -b.e23, t.e031, b.e31, t.e023,
+                      -b.e0i, t.e012),
+          .e123 = dot(-b.e1i, t.e023, -b.e2i, t.e031, -b.e3i, t.e012, b.e01, t.e23i, b.e02, t.e31i,
+                      b.e03, t.e12i),
+          .e01i = dot(-b.e31, t.e03i, b.e12, t.e02i, -b.e2i, t.e012, b.e3i, t.e031, -b.e02, t.e12i,
+                      b.e03, t.e31i),
+          .e02i = dot(b.e23, t.e03i, -b.e12, t.e01i, b.e1i, t.e012, -b.e3i, t.e023, b.e01, t.e12i,
+                      -b.e03, t.e23i),
+          .e03i = dot(-b.e23, t.e02i, b.e31, t.e01i, -b.e1i, t.e031, b.e2i, t.e023, -b.e01, t.e31i,
+                      b.e02, t.e23i),
+          .e23i = dot(-b.e1i, t.e123, -b.e2i, t.e03i, b.e3i, t.e02i, -b.e31, t.e12i, b.e12, t.e31i,
+                      b.e0i, t.e23i),
+          .e31i = dot(b.e1i, t.e03i, -b.e2i, t.e123, -b.e3i, t.e01i, b.e23, t.e12i, -b.e12, t.e23i,
+                      b.e0i, t.e31i),
+          .e12i = dot(-b.e1i, t.e02i, b.e2i, t.e01i, -b.e3i, t.e123, -b.e23, t.e31i, b.e31, t.e23i,
+                      b.e0i, t.e12i),
+          .e0123i = dot(b.e23, t.e01i, b.e31, t.e02i, b.e12, t.e03i, -b.e0i, t.e123, b.e1i, t.e023,
+                        b.e2i, t.e031, b.e3i, t.e012, b.e01, t.e23i, b.e02, t.e31i, b.e03, t.e12i)};
 }
 
 /// gp: Versor Bivector -> Even
@@ -639,9 +659,9 @@ template <class S>
   return {.e23 = dot(a.e2, b.e3, -a.e3, b.e2),
           .e31 = dot(-a.e1, b.e3, a.e3, b.e1),
           .e12 = dot(a.e1, b.e2, -a.e2, b.e1),
-          .e1i = dot(a.e1, b.ei, -a.ei, b.e1),
-          .e2i = dot(a.e2, b.ei, -a.ei, b.e2),
-          .e3i = dot(a.e3, b.ei, -a.ei, b.e3),
+          .e1i = dot(-a.ei, b.e1, a.e1, b.ei),
+          .e2i = dot(-a.ei, b.e2, a.e2, b.ei),
+          .e3i = dot(-a.ei, b.e3, a.e3, b.ei),
           .e0i = dot(a.e0, b.ei, -a.ei, b.e0),
           .e01 = dot(a.e0, b.e1, -a.e1, b.e0),
           .e02 = dot(a.e0, b.e2, -a.e2, b.e0),
@@ -654,16 +674,16 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> outer(const Bivector<S>& b,
                                                           const Vector<S>& v) noexcept {
-  return {.e023 = dot(b.e23, v.e0, b.e02, v.e3, -b.e03, v.e2),
-          .e031 = dot(b.e31, v.e0, -b.e01, v.e3, b.e03, v.e1),
-          .e012 = dot(b.e12, v.e0, b.e01, v.e2, -b.e02, v.e1),
+  return {.e023 = dot(b.e02, v.e3, -b.e03, v.e2, b.e23, v.e0),
+          .e031 = dot(-b.e01, v.e3, b.e03, v.e1, b.e31, v.e0),
+          .e012 = dot(b.e01, v.e2, -b.e02, v.e1, b.e12, v.e0),
           .e123 = dot(b.e23, v.e1, b.e31, v.e2, b.e12, v.e3),
-          .e01i = dot(b.e1i, v.e0, -b.e0i, v.e1, b.e01, v.ei),
-          .e02i = dot(b.e2i, v.e0, -b.e0i, v.e2, b.e02, v.ei),
-          .e03i = dot(b.e3i, v.e0, -b.e0i, v.e3, b.e03, v.ei),
-          .e23i = dot(b.e23, v.ei, -b.e2i, v.e3, b.e3i, v.e2),
-          .e31i = dot(b.e31, v.ei, b.e1i, v.e3, -b.e3i, v.e1),
-          .e12i = dot(b.e12, v.ei, -b.e1i, v.e2, b.e2i, v.e1)};
+          .e01i = dot(-b.e0i, v.e1, b.e1i, v.e0, b.e01, v.ei),
+          .e02i = dot(-b.e0i, v.e2, b.e2i, v.e0, b.e02, v.ei),
+          .e03i = dot(-b.e0i, v.e3, b.e3i, v.e0, b.e03, v.ei),
+          .e23i = dot(-b.e2i, v.e3, b.e3i, v.e2, b.e23, v.ei),
+          .e31i = dot(b.e1i, v.e3, -b.e3i, v.e1, b.e31, v.ei),
+          .e12i = dot(-b.e1i, v.e2, b.e2i, v.e1, b.e12, v.ei)};
 }
 
 /// outer: Trivector Vector -> Quadvector
@@ -673,10 +693,10 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Quadvector<S> outer(const Trivector<S>& t,
                                                            const Vector<S>& v) noexcept {
   return {.e0123 = dot(t.e023, v.e1, t.e031, v.e2, t.e012, v.e3, -t.e123, v.e0),
-          .e023i = dot(t.e023, v.ei, -t.e02i, v.e3, t.e03i, v.e2, -t.e23i, v.e0),
-          .e031i = dot(t.e031, v.ei, t.e01i, v.e3, -t.e03i, v.e1, -t.e31i, v.e0),
-          .e012i = dot(t.e012, v.ei, -t.e01i, v.e2, t.e02i, v.e1, -t.e12i, v.e0),
-          .e123i = dot(t.e123, v.ei, -t.e23i, v.e1, -t.e31i, v.e2, -t.e12i, v.e3)};
+          .e023i = dot(-t.e02i, v.e3, t.e03i, v.e2, t.e023, v.ei, -t.e23i, v.e0),
+          .e031i = dot(t.e01i, v.e3, -t.e03i, v.e1, t.e031, v.ei, -t.e31i, v.e0),
+          .e012i = dot(-t.e01i, v.e2, t.e02i, v.e1, t.e012, v.ei, -t.e12i, v.e0),
+          .e123i = dot(-t.e23i, v.e1, -t.e31i, v.e2, -t.e12i, v.e3, t.e123, v.ei)};
 }
 
 /// outer: Quadvector Vector -> Pseudoscalar
@@ -686,7 +706,7 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Quadvector<S>& q,
                                                              const Vector<S>& v) noexcept {
   return {.e0123i =
-              dot(q.e0123, v.ei, -q.e023i, v.e1, -q.e031i, v.e2, -q.e012i, v.e3, q.e123i, v.e0)};
+              dot(-q.e023i, v.e1, -q.e031i, v.e2, -q.e012i, v.e3, q.e0123, v.ei, q.e123i, v.e0)};
 }
 
 /// regressive: Quadvector Quadvector -> Trivector
@@ -702,9 +722,9 @@ template <class S>
           .e01i = dot(a.e031i, b.e012i, -a.e012i, b.e031i),
           .e02i = dot(-a.e023i, b.e012i, a.e012i, b.e023i),
           .e03i = dot(a.e023i, b.e031i, -a.e031i, b.e023i),
-          .e23i = dot(a.e023i, b.e123i, -a.e123i, b.e023i),
-          .e31i = dot(a.e031i, b.e123i, -a.e123i, b.e031i),
-          .e12i = dot(a.e012i, b.e123i, -a.e123i, b.e012i)};
+          .e23i = dot(-a.e123i, b.e023i, a.e023i, b.e123i),
+          .e31i = dot(-a.e123i, b.e031i, a.e031i, b.e123i),
+          .e12i = dot(-a.e123i, b.e012i, a.e012i, b.e123i)};
 }
 
 /// regressive: Trivector Quadvector -> Bivector
@@ -713,12 +733,12 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> regressive(const Trivector<S>& t,
                                                               const Quadvector<S>& q) noexcept {
-  return {.e23 = dot(q.e123i, t.e023, -q.e023i, t.e123, q.e0123, t.e23i),
-          .e31 = dot(q.e123i, t.e031, -q.e031i, t.e123, q.e0123, t.e31i),
-          .e12 = dot(q.e123i, t.e012, -q.e012i, t.e123, q.e0123, t.e12i),
-          .e1i = dot(q.e123i, t.e01i, -q.e012i, t.e31i, q.e031i, t.e12i),
-          .e2i = dot(q.e123i, t.e02i, q.e012i, t.e23i, -q.e023i, t.e12i),
-          .e3i = dot(q.e123i, t.e03i, -q.e031i, t.e23i, q.e023i, t.e31i),
+  return {.e23 = dot(-q.e023i, t.e123, q.e123i, t.e023, q.e0123, t.e23i),
+          .e31 = dot(-q.e031i, t.e123, q.e123i, t.e031, q.e0123, t.e31i),
+          .e12 = dot(-q.e012i, t.e123, q.e123i, t.e012, q.e0123, t.e12i),
+          .e1i = dot(-q.e012i, t.e31i, q.e031i, t.e12i, q.e123i, t.e01i),
+          .e2i = dot(q.e012i, t.e23i, -q.e023i, t.e12i, q.e123i, t.e02i),
+          .e3i = dot(-q.e031i, t.e23i, q.e023i, t.e31i, q.e123i, t.e03i),
           .e0i = dot(q.e023i, t.e01i, q.e031i, t.e02i, q.e012i, t.e03i),
           .e01 = dot(q.e012i, t.e031, -q.e031i, t.e012, q.e0123, t.e01i),
           .e02 = dot(-q.e012i, t.e023, q.e023i, t.e012, q.e0123, t.e02i),
@@ -733,14 +753,14 @@ template <class S>
                                                             const Trivector<S>& b) noexcept {
   return {.e0 = dot(a.e023, b.e01i, a.e031, b.e02i, a.e012, b.e03i, a.e01i, b.e023, a.e02i, b.e031,
                     a.e03i, b.e012),
-          .e1 = dot(a.e031, b.e12i, -a.e012, b.e31i, a.e123, b.e01i, a.e01i, b.e123, -a.e31i,
+          .e1 = dot(a.e123, b.e01i, a.e01i, b.e123, a.e031, b.e12i, -a.e012, b.e31i, -a.e31i,
                     b.e012, a.e12i, b.e031),
-          .e2 = dot(-a.e023, b.e12i, a.e012, b.e23i, a.e123, b.e02i, a.e02i, b.e123, a.e23i, b.e012,
+          .e2 = dot(a.e123, b.e02i, a.e02i, b.e123, -a.e023, b.e12i, a.e012, b.e23i, a.e23i, b.e012,
                     -a.e12i, b.e023),
-          .e3 = dot(a.e023, b.e31i, -a.e031, b.e23i, a.e123, b.e03i, a.e03i, b.e123, -a.e23i,
+          .e3 = dot(a.e123, b.e03i, a.e03i, b.e123, a.e023, b.e31i, -a.e031, b.e23i, -a.e23i,
                     b.e031, a.e31i, b.e023),
-          .ei = dot(a.e01i, b.e23i, a.e02i, b.e31i, a.e03i, b.e12i, a.e23i, b.e01i, a.e31i, b.e02i,
-                    a.e12i, b.e03i)};
+          .ei = dot(a.e23i, b.e01i, a.e31i, b.e02i, a.e12i, b.e03i, a.e01i, b.e23i, a.e02i, b.e31i,
+                    a.e03i, b.e12i)};
 }
 
 /// inner: Vector Vector -> Scalar
@@ -748,7 +768,7 @@ template <class S>
 /// Cost: 5 mul, 4 add (3 fused).  Sparsity: 5 of 25 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S inner(const Vector<S>& a, const Vector<S>& b) noexcept {
-  return dot(-a.e0, b.ei, a.e1, b.e1, a.e2, b.e2, a.e3, b.e3, -a.ei, b.e0);
+  return dot(a.e1, b.e1, a.e2, b.e2, a.e3, b.e3, -a.e0, b.ei, -a.ei, b.e0);
 }
 
 /// inner: Vector Bivector -> Vector
@@ -758,10 +778,10 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> inner(const Vector<S>& v,
                                                        const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2, -b.e03, v.e3),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, b.e31, v.e3, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e23, v.e3, -b.e02, v.ei),
-          .e3 = dot(b.e3i, v.e0, -b.e31, v.e1, b.e23, v.e2, -b.e03, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e31, v.e3, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, -b.e23, v.e3, b.e2i, v.e0, -b.e02, v.ei),
+          .e3 = dot(-b.e31, v.e1, b.e23, v.e2, b.e3i, v.e0, -b.e03, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3)};
 }
 
 /// inner: Vector Trivector -> Bivector
@@ -770,12 +790,12 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> inner(const Vector<S>& v,
                                                          const Trivector<S>& t) noexcept {
-  return {.e23 = dot(-t.e23i, v.e0, t.e123, v.e1, -t.e023, v.ei),
-          .e31 = dot(-t.e31i, v.e0, t.e123, v.e2, -t.e031, v.ei),
-          .e12 = dot(-t.e12i, v.e0, t.e123, v.e3, -t.e012, v.ei),
-          .e1i = dot(-t.e12i, v.e2, t.e31i, v.e3, -t.e01i, v.ei),
-          .e2i = dot(t.e12i, v.e1, -t.e23i, v.e3, -t.e02i, v.ei),
-          .e3i = dot(-t.e31i, v.e1, t.e23i, v.e2, -t.e03i, v.ei),
+  return {.e23 = dot(t.e123, v.e1, -t.e23i, v.e0, -t.e023, v.ei),
+          .e31 = dot(t.e123, v.e2, -t.e31i, v.e0, -t.e031, v.ei),
+          .e12 = dot(t.e123, v.e3, -t.e12i, v.e0, -t.e012, v.ei),
+          .e1i = dot(-t.e01i, v.ei, -t.e12i, v.e2, t.e31i, v.e3),
+          .e2i = dot(-t.e02i, v.ei, t.e12i, v.e1, -t.e23i, v.e3),
+          .e3i = dot(-t.e03i, v.ei, -t.e31i, v.e1, t.e23i, v.e2),
           .e0i = dot(-t.e01i, v.e1, -t.e02i, v.e2, -t.e03i, v.e3),
           .e01 = dot(-t.e01i, v.e0, t.e012, v.e2, -t.e031, v.e3),
           .e02 = dot(-t.e02i, v.e0, -t.e012, v.e1, t.e023, v.e3),
@@ -788,8 +808,8 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S inner(const Bivector<S>& a,
                                                const Bivector<S>& b) noexcept {
-  return scalar::compensated_sum(dot(-a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, -a.e1i, b.e01),
-                                 dot(-a.e2i, b.e02, -a.e3i, b.e03, a.e0i, b.e0i, -a.e01, b.e1i),
+  return scalar::compensated_sum(dot(-a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, a.e0i, b.e0i),
+                                 dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, -a.e01, b.e1i),
                                  dot(-a.e02, b.e2i, -a.e03, b.e3i));
 }
 
@@ -800,10 +820,10 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> left_contraction(const Vector<S>& v,
                                                                   const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2, -b.e03, v.e3),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, b.e31, v.e3, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e23, v.e3, -b.e02, v.ei),
-          .e3 = dot(b.e3i, v.e0, -b.e31, v.e1, b.e23, v.e2, -b.e03, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e31, v.e3, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, -b.e23, v.e3, b.e2i, v.e0, -b.e02, v.ei),
+          .e3 = dot(-b.e31, v.e1, b.e23, v.e2, b.e3i, v.e0, -b.e03, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3)};
 }
 
 /// left_contraction: Vector Trivector -> Bivector
@@ -812,12 +832,12 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> left_contraction(
     const Vector<S>& v, const Trivector<S>& t) noexcept {
-  return {.e23 = dot(-t.e23i, v.e0, t.e123, v.e1, -t.e023, v.ei),
-          .e31 = dot(-t.e31i, v.e0, t.e123, v.e2, -t.e031, v.ei),
-          .e12 = dot(-t.e12i, v.e0, t.e123, v.e3, -t.e012, v.ei),
-          .e1i = dot(-t.e12i, v.e2, t.e31i, v.e3, -t.e01i, v.ei),
-          .e2i = dot(t.e12i, v.e1, -t.e23i, v.e3, -t.e02i, v.ei),
-          .e3i = dot(-t.e31i, v.e1, t.e23i, v.e2, -t.e03i, v.ei),
+  return {.e23 = dot(t.e123, v.e1, -t.e23i, v.e0, -t.e023, v.ei),
+          .e31 = dot(t.e123, v.e2, -t.e31i, v.e0, -t.e031, v.ei),
+          .e12 = dot(t.e123, v.e3, -t.e12i, v.e0, -t.e012, v.ei),
+          .e1i = dot(-t.e01i, v.ei, -t.e12i, v.e2, t.e31i, v.e3),
+          .e2i = dot(-t.e02i, v.ei, t.e12i, v.e1, -t.e23i, v.e3),
+          .e3i = dot(-t.e03i, v.ei, -t.e31i, v.e1, t.e23i, v.e2),
           .e0i = dot(-t.e01i, v.e1, -t.e02i, v.e2, -t.e03i, v.e3),
           .e01 = dot(-t.e01i, v.e0, t.e012, v.e2, -t.e031, v.e3),
           .e02 = dot(-t.e02i, v.e0, -t.e012, v.e1, t.e023, v.e3),
@@ -830,16 +850,16 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> left_contraction(const Bivector<S>& b,
                                                                   const Trivector<S>& t) noexcept {
-  return {.e0 = dot(-b.e23, t.e023, -b.e31, t.e031, -b.e12, t.e012, -b.e01, t.e01i, -b.e02, t.e02i,
-                    -b.e03, t.e03i),
-          .e1 = dot(-b.e23, t.e123, b.e2i, t.e012, -b.e3i, t.e031, -b.e0i, t.e01i, -b.e02, t.e12i,
+  return {.e0 = dot(-b.e01, t.e01i, -b.e02, t.e02i, -b.e03, t.e03i, -b.e23, t.e023, -b.e31, t.e031,
+                    -b.e12, t.e012),
+          .e1 = dot(-b.e23, t.e123, -b.e0i, t.e01i, b.e2i, t.e012, -b.e3i, t.e031, -b.e02, t.e12i,
                     b.e03, t.e31i),
-          .e2 = dot(-b.e31, t.e123, -b.e1i, t.e012, b.e3i, t.e023, -b.e0i, t.e02i, b.e01, t.e12i,
+          .e2 = dot(-b.e31, t.e123, -b.e0i, t.e02i, -b.e1i, t.e012, b.e3i, t.e023, b.e01, t.e12i,
                     -b.e03, t.e23i),
-          .e3 = dot(-b.e12, t.e123, b.e1i, t.e031, -b.e2i, t.e023, -b.e0i, t.e03i, -b.e01, t.e31i,
+          .e3 = dot(-b.e12, t.e123, -b.e0i, t.e03i, b.e1i, t.e031, -b.e2i, t.e023, -b.e01, t.e31i,
                     b.e02, t.e23i),
-          .ei = dot(-b.e23, t.e23i, -b.e31, t.e31i, -b.e12, t.e12i, -b.e1i, t.e01i, -b.e2i, t.e02i,
-                    -b.e3i, t.e03i)};
+          .ei = dot(-b.e1i, t.e01i, -b.e2i, t.e02i, -b.e3i, t.e03i, -b.e23, t.e23i, -b.e31, t.e31i,
+                    -b.e12, t.e12i)};
 }
 
 /// commutator: Bivector Bivector -> Bivector
@@ -854,20 +874,20 @@ template <class S>
                      b.e1i),
           .e12 = dot(-a.e23, b.e31, a.e31, b.e23, -a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02,
                      b.e1i),
-          .e1i = dot(-a.e31, b.e3i, a.e12, b.e2i, -a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, a.e0i,
+          .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, -a.e31, b.e3i, a.e12, b.e2i, a.e0i,
                      b.e1i),
-          .e2i = dot(a.e23, b.e3i, -a.e12, b.e1i, a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e0i,
+          .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e23, b.e3i, -a.e12, b.e1i, a.e0i,
                      b.e2i),
-          .e3i = dot(-a.e23, b.e2i, a.e31, b.e1i, -a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, a.e0i,
+          .e3i = dot(-a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
                      b.e3i),
           .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e01, b.e1i, a.e02, b.e2i, a.e03,
                      b.e3i),
-          .e01 = dot(-a.e31, b.e03, a.e12, b.e02, -a.e0i, b.e01, a.e01, b.e0i, -a.e02, b.e12, a.e03,
-                     b.e31),
-          .e02 = dot(a.e23, b.e03, -a.e12, b.e01, -a.e0i, b.e02, a.e01, b.e12, a.e02, b.e0i, -a.e03,
-                     b.e23),
-          .e03 = dot(-a.e23, b.e02, a.e31, b.e01, -a.e0i, b.e03, -a.e01, b.e31, a.e02, b.e23, a.e03,
-                     b.e0i)};
+          .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02, -a.e0i,
+                     b.e01),
+          .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01, -a.e0i,
+                     b.e02),
+          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.e0i, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
+                     b.e03)};
 }
 
 /// commutator: Trivector Bivector -> Trivector
@@ -884,18 +904,18 @@ template <class S>
                       b.e01, t.e02i),
           .e123 = dot(b.e1i, t.e023, b.e2i, t.e031, b.e3i, t.e012, -b.e01, t.e23i, -b.e02, t.e31i,
                       -b.e03, t.e12i),
-          .e01i = dot(-b.e3i, t.e031, b.e2i, t.e012, -b.e12, t.e02i, b.e31, t.e03i, -b.e03, t.e31i,
+          .e01i = dot(-b.e12, t.e02i, b.e31, t.e03i, -b.e3i, t.e031, b.e2i, t.e012, -b.e03, t.e31i,
                       b.e02, t.e12i),
-          .e02i = dot(b.e3i, t.e023, -b.e1i, t.e012, b.e12, t.e01i, -b.e23, t.e03i, b.e03, t.e23i,
+          .e02i = dot(b.e12, t.e01i, -b.e23, t.e03i, b.e3i, t.e023, -b.e1i, t.e012, b.e03, t.e23i,
                       -b.e01, t.e12i),
-          .e03i = dot(-b.e2i, t.e023, b.e1i, t.e031, -b.e31, t.e01i, b.e23, t.e02i, -b.e02, t.e23i,
+          .e03i = dot(-b.e31, t.e01i, b.e23, t.e02i, -b.e2i, t.e023, b.e1i, t.e031, -b.e02, t.e23i,
                       b.e01, t.e31i),
-          .e23i = dot(b.e1i, t.e123, -b.e3i, t.e02i, b.e2i, t.e03i, -b.e0i, t.e23i, -b.e12, t.e31i,
-                      b.e31, t.e12i),
-          .e31i = dot(b.e2i, t.e123, b.e3i, t.e01i, -b.e1i, t.e03i, b.e12, t.e23i, -b.e0i, t.e31i,
-                      -b.e23, t.e12i),
-          .e12i = dot(b.e3i, t.e123, -b.e2i, t.e01i, b.e1i, t.e02i, -b.e31, t.e23i, b.e23, t.e31i,
-                      -b.e0i, t.e12i)};
+          .e23i = dot(-b.e0i, t.e23i, -b.e12, t.e31i, b.e31, t.e12i, b.e1i, t.e123, -b.e3i, t.e02i,
+                      b.e2i, t.e03i),
+          .e31i = dot(b.e12, t.e23i, -b.e0i, t.e31i, -b.e23, t.e12i, b.e2i, t.e123, b.e3i, t.e01i,
+                      -b.e1i, t.e03i),
+          .e12i = dot(-b.e31, t.e23i, b.e23, t.e31i, -b.e0i, t.e12i, b.e3i, t.e123, -b.e2i, t.e01i,
+                      b.e1i, t.e02i)};
 }
 
 /// commutator: Vector Bivector -> Vector
@@ -905,10 +925,10 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> commutator(const Vector<S>& v,
                                                             const Bivector<S>& b) noexcept {
   return {.e0 = dot(b.e0i, v.e0, -b.e01, v.e1, -b.e02, v.e2, -b.e03, v.e3),
-          .e1 = dot(b.e1i, v.e0, -b.e12, v.e2, b.e31, v.e3, -b.e01, v.ei),
-          .e2 = dot(b.e2i, v.e0, b.e12, v.e1, -b.e23, v.e3, -b.e02, v.ei),
-          .e3 = dot(b.e3i, v.e0, -b.e31, v.e1, b.e23, v.e2, -b.e03, v.ei),
-          .ei = dot(b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3, -b.e0i, v.ei)};
+          .e1 = dot(-b.e12, v.e2, b.e31, v.e3, b.e1i, v.e0, -b.e01, v.ei),
+          .e2 = dot(b.e12, v.e1, -b.e23, v.e3, b.e2i, v.e0, -b.e02, v.ei),
+          .e3 = dot(-b.e31, v.e1, b.e23, v.e2, b.e3i, v.e0, -b.e03, v.ei),
+          .ei = dot(-b.e0i, v.ei, b.e1i, v.e1, b.e2i, v.e2, b.e3i, v.e3)};
 }
 
 /// sandwich: Versor Vector -> Vector
@@ -3779,6 +3799,38 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Similarity<S> unit_correction(
     const Similarity<S>& m, const SimilarityDefect<S>& d) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S half_s = S(-0.5) * d.s;
+      const S half_e012i = S(-0.5) * d.e012i;
+      const S half_e013i = S(-0.5) * d.e013i;
+      const S half_e023i = S(-0.5) * d.e023i;
+      const S half_e123i = S(-0.5) * d.e123i;
+      const auto four_m_s = four(m.s, m.e23, m.e31, m.e12);
+      const auto four_m_e0i = four(m.e0i, m.e023i, m.e031i, m.e012i);
+      const auto four_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e123i);
+      const auto sum1 =
+          dot(four(half_s), four_m_s, four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i),
+              four(half_e013i), turned<3, 4, -1, -2>(four_m_e0i), four(half_e023i),
+              turned<-2, 1, 4, -3>(four_m_e0i));
+      const auto sum2 =
+          dot(four(half_s), four_m_e0i, four(half_e012i), turned<-4, 3, -2, 1>(four_m_s),
+              four(half_e013i), turned<3, 4, -1, -2>(four_m_s), four(half_e023i),
+              turned<-2, 1, 4, -3>(four_m_s));
+      const auto sum3 =
+          dot(four(half_s), four_m_e1i, four(half_e012i), turned<2, -1, -4, 3>(four_m_e1i),
+              four(half_e013i), turned<3, 4, -1, -2>(four_m_e1i), four(half_e023i),
+              turned<-4, 3, -2, 1>(four_m_e1i), four(half_e123i), turned<-2, -3, -4, 1>(four_m_s),
+              four(half_e123i), turned<2, 3, 4, -1>(four_m_e0i));
+      Similarity<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, sum3);
+      lanes::store<8>(result, sum2);
+      return result;
+    }
+  }
   const S half_s = S(-0.5) * d.s;
   const S half_e012i = S(-0.5) * d.e012i;
   const S half_e013i = S(-0.5) * d.e013i;
@@ -3879,10 +3931,10 @@ template <class S>
       const S half_e013i = S(-0.5) * d.e013i;
       const S half_e023i = S(-0.5) * d.e023i;
       const S half_e123i = S(-0.5) * d.e123i;
-      const auto four_m_s = lanes::load<S, 0>(m);
-      const auto four_m_e1i = lanes::load<S, 4>(m);
-      const auto four_m_e0i = lanes::load<S, 8>(m);
-      const auto four_m_e01 = lanes::load<S, 12>(m);
+      const auto four_m_s = four(m.s, m.e23, m.e31, m.e12);
+      const auto four_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e123i);
+      const auto four_m_e0i = four(m.e0i, m.e023i, m.e031i, m.e012i);
+      const auto four_m_e01 = four(m.e01, m.e02, m.e03, m.e0123);
       const auto sum1 =
           dot(four(half_s), four_m_s, four(half_e0123), turned<4, -1, -2, -3>(four_m_e1i),
               four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i), four(half_e013i),
@@ -3894,20 +3946,20 @@ template <class S>
               turned<3, 4, -1, -2>(four_m_s), four(half_e023i), turned<-2, 1, 4, -3>(four_m_s),
               four(half_e123i), turned<4, -1, -2, -3>(four_m_e01));
       const auto sum3 =
-          dot(four(half_s), turned<1, 4, 3, 2>(four_m_e1i), four(half_e012i),
-              turned<2, 3, -4, -1>(four_m_e1i), four(half_e013i), turned<3, -2, -1, 4>(four_m_e1i),
-              four(half_e023i), turned<-4, 1, -2, 3>(four_m_e1i), four(half_e123i),
-              turned<-2, 1, -4, -3>(four_m_s), four(half_e123i), turned<2, -1, 4, 3>(four_m_e0i));
+          dot(four(half_s), four_m_e1i, four(half_e012i), turned<2, -1, -4, 3>(four_m_e1i),
+              four(half_e013i), turned<3, 4, -1, -2>(four_m_e1i), four(half_e023i),
+              turned<-4, 3, -2, 1>(four_m_e1i), four(half_e123i), turned<-2, -3, -4, 1>(four_m_s),
+              four(half_e123i), turned<2, 3, 4, -1>(four_m_e0i));
       const auto sum4 =
-          dot(four(half_s), turned<1, 4, 3, 2>(four_m_e01), four(half_e0123),
-              turned<-2, 1, -4, -3>(four_m_s), four(half_e0123), turned<-2, 1, -4, -3>(four_m_e0i),
-              four(half_e012i), turned<-2, -3, 4, 1>(four_m_e01), four(half_e013i),
-              turned<-3, 2, 1, -4>(four_m_e01), four(half_e023i), turned<4, -1, 2, -3>(four_m_e01));
+          dot(four(half_s), four_m_e01, four(half_e0123), turned<-2, -3, -4, 1>(four_m_s),
+              four(half_e0123), turned<-2, -3, -4, 1>(four_m_e0i), four(half_e012i),
+              turned<-2, 1, 4, -3>(four_m_e01), four(half_e013i), turned<-3, -4, 1, 2>(four_m_e01),
+              four(half_e023i), turned<4, -3, 2, -1>(four_m_e01));
       Versor<S> result;
       lanes::store<0>(result, sum1);
-      lanes::store<4>(result, turned<1, 4, 3, 2>(sum3));
+      lanes::store<4>(result, sum3);
       lanes::store<8>(result, sum2);
-      lanes::store<12>(result, turned<1, 4, 3, 2>(sum4));
+      lanes::store<12>(result, sum4);
       return result;
     }
   }

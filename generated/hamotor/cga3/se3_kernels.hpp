@@ -25,9 +25,9 @@ template <class S>
   return {.w23 = dot(a.w31, b.w12, -a.w12, b.w31),
           .w31 = dot(-a.w23, b.w12, a.w12, b.w23),
           .w12 = dot(a.w23, b.w31, -a.w31, b.w23),
-          .v1 = dot(a.w31, b.v3, -a.w12, b.v2, a.v2, b.w12, -a.v3, b.w31),
-          .v2 = dot(-a.w23, b.v3, a.w12, b.v1, -a.v1, b.w12, a.v3, b.w23),
-          .v3 = dot(a.w23, b.v2, -a.w31, b.v1, a.v1, b.w31, -a.v2, b.w23)};
+          .v1 = dot(a.v2, b.w12, -a.v3, b.w31, a.w31, b.v3, -a.w12, b.v2),
+          .v2 = dot(-a.v1, b.w12, a.v3, b.w23, -a.w23, b.v3, a.w12, b.v1),
+          .v3 = dot(a.v1, b.w31, -a.v2, b.w23, a.w23, b.v2, -a.w31, b.v1)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
@@ -60,14 +60,14 @@ template <class S>
           .e23 = dot(-half_w23, m.s, half_w12, m.e31, -half_w31, m.e12),
           .e31 = dot(-half_w31, m.s, -half_w12, m.e23, half_w23, m.e12),
           .e12 = dot(-half_w12, m.s, half_w31, m.e23, -half_w23, m.e31),
-          .e1i = dot(-half_v1, m.s, half_v3, m.e31, -half_v2, m.e12, half_w12, m.e2i, -half_w31,
-                     m.e3i, half_w23, m.e123i),
-          .e2i = dot(-half_v2, m.s, -half_v3, m.e23, half_v1, m.e12, -half_w12, m.e1i, half_w23,
-                     m.e3i, half_w31, m.e123i),
-          .e3i = dot(-half_v3, m.s, half_v2, m.e23, -half_v1, m.e31, half_w31, m.e1i, -half_w23,
-                     m.e2i, half_w12, m.e123i),
-          .e123i = dot(-half_v1, m.e23, -half_v2, m.e31, -half_v3, m.e12, -half_w23, m.e1i,
-                       -half_w31, m.e2i, -half_w12, m.e3i)};
+          .e1i = dot(half_w12, m.e2i, -half_w31, m.e3i, half_w23, m.e123i, -half_v1, m.s, half_v3,
+                     m.e31, -half_v2, m.e12),
+          .e2i = dot(-half_w12, m.e1i, half_w23, m.e3i, half_w31, m.e123i, -half_v2, m.s, -half_v3,
+                     m.e23, half_v1, m.e12),
+          .e3i = dot(half_w31, m.e1i, -half_w23, m.e2i, half_w12, m.e123i, -half_v3, m.s, half_v2,
+                     m.e23, -half_v1, m.e31),
+          .e123i = dot(-half_w23, m.e1i, -half_w31, m.e2i, -half_w12, m.e3i, -half_v1, m.e23,
+                       -half_v2, m.e31, -half_v3, m.e12)};
 }
 
 /// Ad: Motor Rate -> Rate

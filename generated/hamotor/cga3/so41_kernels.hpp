@@ -27,13 +27,13 @@ template <class S>
   return {.w23 = dot(a.w31, b.w12, -a.w12, b.w31, a.v2, b.u3, -a.v3, b.u2, a.u2, b.v3, -a.u3, b.v2),
           .w31 = dot(-a.w23, b.w12, a.w12, b.w23, -a.v1, b.u3, a.v3, b.u1, -a.u1, b.v3, a.u3, b.v1),
           .w12 = dot(a.w23, b.w31, -a.w31, b.w23, a.v1, b.u2, -a.v2, b.u1, a.u1, b.v2, -a.u2, b.v1),
-          .v1 = dot(a.w31, b.v3, -a.w12, b.v2, -a.v1, b.d, a.v2, b.w12, -a.v3, b.w31, a.d, b.v1),
-          .v2 = dot(-a.w23, b.v3, a.w12, b.v1, -a.v1, b.w12, -a.v2, b.d, a.v3, b.w23, a.d, b.v2),
-          .v3 = dot(a.w23, b.v2, -a.w31, b.v1, a.v1, b.w31, -a.v2, b.w23, -a.v3, b.d, a.d, b.v3),
+          .v1 = dot(-a.v1, b.d, a.v2, b.w12, -a.v3, b.w31, a.w31, b.v3, -a.w12, b.v2, a.d, b.v1),
+          .v2 = dot(-a.v1, b.w12, -a.v2, b.d, a.v3, b.w23, -a.w23, b.v3, a.w12, b.v1, a.d, b.v2),
+          .v3 = dot(a.v1, b.w31, -a.v2, b.w23, -a.v3, b.d, a.w23, b.v2, -a.w31, b.v1, a.d, b.v3),
           .d = dot(-a.v1, b.u1, -a.v2, b.u2, -a.v3, b.u3, a.u1, b.v1, a.u2, b.v2, a.u3, b.v3),
-          .u1 = dot(a.w31, b.u3, -a.w12, b.u2, -a.d, b.u1, a.u1, b.d, a.u2, b.w12, -a.u3, b.w31),
-          .u2 = dot(-a.w23, b.u3, a.w12, b.u1, -a.d, b.u2, -a.u1, b.w12, a.u2, b.d, a.u3, b.w23),
-          .u3 = dot(a.w23, b.u2, -a.w31, b.u1, -a.d, b.u3, a.u1, b.w31, -a.u2, b.w23, a.u3, b.d)};
+          .u1 = dot(a.u1, b.d, a.u2, b.w12, -a.u3, b.w31, a.w31, b.u3, -a.w12, b.u2, -a.d, b.u1),
+          .u2 = dot(-a.u1, b.w12, a.u2, b.d, a.u3, b.w23, -a.w23, b.u3, a.w12, b.u1, -a.d, b.u2),
+          .u3 = dot(a.u1, b.w31, -a.u2, b.w23, a.u3, b.d, a.w23, b.u2, -a.w31, b.u1, -a.d, b.u3)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
@@ -49,14 +49,14 @@ template <class S>
           dot(mu.l12, w.w23, -mu.l23, w.w12, mu.p3, w.v1, -mu.p1, w.v3, mu.k3, w.u1, -mu.k1, w.u3),
       .l12 =
           dot(-mu.l31, w.w23, mu.l23, w.w31, -mu.p2, w.v1, mu.p1, w.v2, -mu.k2, w.u1, mu.k1, w.u2),
-      .p1 = dot(-mu.p3, w.w31, mu.p2, w.w12, mu.p1, w.d, mu.q, w.u1, -mu.l12, w.u2, mu.l31, w.u3),
-      .p2 = dot(mu.p3, w.w23, -mu.p1, w.w12, mu.p2, w.d, mu.l12, w.u1, mu.q, w.u2, -mu.l23, w.u3),
-      .p3 = dot(-mu.p2, w.w23, mu.p1, w.w31, mu.p3, w.d, -mu.l31, w.u1, mu.l23, w.u2, mu.q, w.u3),
+      .p1 = dot(mu.q, w.u1, -mu.l12, w.u2, mu.l31, w.u3, -mu.p3, w.w31, mu.p2, w.w12, mu.p1, w.d),
+      .p2 = dot(mu.l12, w.u1, mu.q, w.u2, -mu.l23, w.u3, mu.p3, w.w23, -mu.p1, w.w12, mu.p2, w.d),
+      .p3 = dot(-mu.l31, w.u1, mu.l23, w.u2, mu.q, w.u3, -mu.p2, w.w23, mu.p1, w.w31, mu.p3, w.d),
       .q = dot(-mu.p1, w.v1, -mu.p2, w.v2, -mu.p3, w.v3, mu.k1, w.u1, mu.k2, w.u2, mu.k3, w.u3),
-      .k1 = dot(-mu.k3, w.w31, mu.k2, w.w12, -mu.q, w.v1, -mu.l12, w.v2, mu.l31, w.v3, -mu.k1, w.d),
-      .k2 = dot(mu.k3, w.w23, -mu.k1, w.w12, mu.l12, w.v1, -mu.q, w.v2, -mu.l23, w.v3, -mu.k2, w.d),
+      .k1 = dot(-mu.q, w.v1, -mu.l12, w.v2, mu.l31, w.v3, -mu.k3, w.w31, mu.k2, w.w12, -mu.k1, w.d),
+      .k2 = dot(mu.l12, w.v1, -mu.q, w.v2, -mu.l23, w.v3, mu.k3, w.w23, -mu.k1, w.w12, -mu.k2, w.d),
       .k3 =
-          dot(-mu.k2, w.w23, mu.k1, w.w31, -mu.l31, w.v1, mu.l23, w.v2, -mu.q, w.v3, -mu.k3, w.d)};
+          dot(-mu.l31, w.v1, mu.l23, w.v2, -mu.q, w.v3, -mu.k2, w.w23, mu.k1, w.w31, -mu.k3, w.d)};
 }
 
 /// kinematics: Versor Rate -> Versor

@@ -6,6 +6,7 @@
 // Kernels: unrolled, sparse, for any scalar type S.
 #pragma once
 
+#include "hamotor/lanes.hpp"
 #include "hamotor/pga3/elements.hpp"
 
 namespace hamotor::pga3 {
@@ -19,18 +20,39 @@ using hamotor::select;
 /// Cost: 48 mul, 40 add (32 fused).  Sparsity: 48 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& a, const Motor<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
+      const auto sum1 =
+          dot(four(a.s), four_b_s, four(a.e23), turned<-2, 1, 4, -3>(four_b_s), four(a.e31),
+              turned<-3, -4, 1, 2>(four_b_s), four(a.e12), turned<-4, 3, -2, 1>(four_b_s));
+      const auto sum2 =
+          dot(four(a.e01), turned<1, 4, -3, 2>(four_b_s), four(a.e02),
+              turned<-4, 1, 2, 3>(four_b_s), four(a.e03), turned<3, -2, 1, 4>(four_b_s),
+              four(a.e0123), turned<-2, -3, -4, 1>(four_b_s), four(a.s), four_b_e01, four(a.e23),
+              turned<-4, 3, -2, 1>(four_b_e01), four(a.e31), turned<-3, -4, 1, 2>(four_b_e01),
+              four(a.e12), turned<2, -1, -4, 3>(four_b_e01));
+      Motor<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, sum2);
+      return result;
+    }
+  }
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
           .e23 = dot(a.s, b.e23, a.e23, b.s, -a.e31, b.e12, a.e12, b.e31),
           .e31 = dot(a.s, b.e31, a.e23, b.e12, a.e31, b.s, -a.e12, b.e23),
           .e12 = dot(a.s, b.e12, -a.e23, b.e31, a.e31, b.e23, a.e12, b.s),
-          .e01 = dot(a.s, b.e01, -a.e23, b.e0123, -a.e31, b.e03, a.e12, b.e02, a.e01, b.s, -a.e02,
-                     b.e12, a.e03, b.e31, -a.e0123, b.e23),
-          .e02 = dot(a.s, b.e02, a.e23, b.e03, -a.e31, b.e0123, -a.e12, b.e01, a.e01, b.e12, a.e02,
-                     b.s, -a.e03, b.e23, -a.e0123, b.e31),
-          .e03 = dot(a.s, b.e03, -a.e23, b.e02, a.e31, b.e01, -a.e12, b.e0123, -a.e01, b.e31, a.e02,
-                     b.e23, a.e03, b.s, -a.e0123, b.e12),
-          .e0123 = dot(a.s, b.e0123, a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02,
-                       b.e31, a.e03, b.e12, a.e0123, b.s)};
+          .e01 = dot(a.e01, b.s, -a.e02, b.e12, a.e03, b.e31, -a.e0123, b.e23, a.s, b.e01, -a.e23,
+                     b.e0123, -a.e31, b.e03, a.e12, b.e02),
+          .e02 = dot(a.e01, b.e12, a.e02, b.s, -a.e03, b.e23, -a.e0123, b.e31, a.s, b.e02, a.e23,
+                     b.e03, -a.e31, b.e0123, -a.e12, b.e01),
+          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.s, -a.e0123, b.e12, a.s, b.e03, -a.e23,
+                     b.e02, a.e31, b.e01, -a.e12, b.e0123),
+          .e0123 = dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e0123, b.s, a.s, b.e0123, a.e23,
+                       b.e01, a.e31, b.e02, a.e12, b.e03)};
 }
 
 /// gp: Rotor Rotor -> Rotor
@@ -49,6 +71,24 @@ template <class S>
 /// Cost: 32 mul, 24 add (16 fused).  Sparsity: 32 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Motor<S> gp(const Motor<S>& m, const Rotor<S>& r) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_r_s = four(r.s, r.e23, r.e31, r.e12);
+      const auto sum1 =
+          dot(four(m.s), four_r_s, four(m.e23), turned<-2, 1, 4, -3>(four_r_s), four(m.e31),
+              turned<-3, -4, 1, 2>(four_r_s), four(m.e12), turned<-4, 3, -2, 1>(four_r_s));
+      const auto sum2 =
+          dot(four(m.e01), turned<1, 2, -3, 4>(four_r_s), four(m.e02),
+              turned<-4, 3, 2, 1>(four_r_s), four(m.e03), turned<3, 4, 1, -2>(four_r_s),
+              four(m.e0123), turned<-2, 1, -4, -3>(four_r_s));
+      Motor<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, turned<1, 4, 3, 2>(sum2));
+      return result;
+    }
+  }
   return {.s = dot(m.s, r.s, -m.e23, r.e23, -m.e31, r.e31, -m.e12, r.e12),
           .e23 = dot(m.s, r.e23, m.e23, r.s, -m.e31, r.e12, m.e12, r.e31),
           .e31 = dot(m.s, r.e31, m.e23, r.e12, m.e31, r.s, -m.e12, r.e23),
@@ -100,14 +140,14 @@ template <class S>
           .e23 = dot(b.e23, m.s, -b.e12, m.e31, b.e31, m.e12),
           .e31 = dot(b.e31, m.s, b.e12, m.e23, -b.e23, m.e12),
           .e12 = dot(b.e12, m.s, -b.e31, m.e23, b.e23, m.e31),
-          .e01 = dot(b.e01, m.s, -b.e03, m.e31, b.e02, m.e12, -b.e12, m.e02, b.e31, m.e03, -b.e23,
-                     m.e0123),
-          .e02 = dot(b.e02, m.s, b.e03, m.e23, -b.e01, m.e12, b.e12, m.e01, -b.e23, m.e03, -b.e31,
-                     m.e0123),
-          .e03 = dot(b.e03, m.s, -b.e02, m.e23, b.e01, m.e31, -b.e31, m.e01, b.e23, m.e02, -b.e12,
-                     m.e0123),
-          .e0123 = dot(b.e01, m.e23, b.e02, m.e31, b.e03, m.e12, b.e23, m.e01, b.e31, m.e02, b.e12,
-                       m.e03)};
+          .e01 = dot(-b.e12, m.e02, b.e31, m.e03, -b.e23, m.e0123, b.e01, m.s, -b.e03, m.e31, b.e02,
+                     m.e12),
+          .e02 = dot(b.e12, m.e01, -b.e23, m.e03, -b.e31, m.e0123, b.e02, m.s, b.e03, m.e23, -b.e01,
+                     m.e12),
+          .e03 = dot(-b.e31, m.e01, b.e23, m.e02, -b.e12, m.e0123, b.e03, m.s, -b.e02, m.e23, b.e01,
+                     m.e31),
+          .e0123 = dot(b.e23, m.e01, b.e31, m.e02, b.e12, m.e03, b.e01, m.e23, b.e02, m.e31, b.e03,
+                       m.e12)};
 }
 
 /// gp: Bivector Motor -> Even
@@ -120,14 +160,14 @@ template <class S>
           .e23 = dot(b.e23, m.s, -b.e31, m.e12, b.e12, m.e31),
           .e31 = dot(b.e23, m.e12, b.e31, m.s, -b.e12, m.e23),
           .e12 = dot(-b.e23, m.e31, b.e31, m.e23, b.e12, m.s),
-          .e01 = dot(-b.e23, m.e0123, -b.e31, m.e03, b.e12, m.e02, b.e01, m.s, -b.e02, m.e12, b.e03,
-                     m.e31),
-          .e02 = dot(b.e23, m.e03, -b.e31, m.e0123, -b.e12, m.e01, b.e01, m.e12, b.e02, m.s, -b.e03,
-                     m.e23),
-          .e03 = dot(-b.e23, m.e02, b.e31, m.e01, -b.e12, m.e0123, -b.e01, m.e31, b.e02, m.e23,
-                     b.e03, m.s),
-          .e0123 = dot(b.e23, m.e01, b.e31, m.e02, b.e12, m.e03, b.e01, m.e23, b.e02, m.e31, b.e03,
-                       m.e12)};
+          .e01 = dot(b.e01, m.s, -b.e02, m.e12, b.e03, m.e31, -b.e23, m.e0123, -b.e31, m.e03, b.e12,
+                     m.e02),
+          .e02 = dot(b.e01, m.e12, b.e02, m.s, -b.e03, m.e23, b.e23, m.e03, -b.e31, m.e0123, -b.e12,
+                     m.e01),
+          .e03 = dot(-b.e01, m.e31, b.e02, m.e23, b.e03, m.s, -b.e23, m.e02, b.e31, m.e01, -b.e12,
+                     m.e0123),
+          .e0123 = dot(b.e01, m.e23, b.e02, m.e31, b.e03, m.e12, b.e23, m.e01, b.e31, m.e02, b.e12,
+                       m.e03)};
 }
 
 /// gp: Bivector Bivector -> Even
@@ -140,11 +180,11 @@ template <class S>
           .e23 = dot(-a.e31, b.e12, a.e12, b.e31),
           .e31 = dot(a.e23, b.e12, -a.e12, b.e23),
           .e12 = dot(-a.e23, b.e31, a.e31, b.e23),
-          .e01 = dot(-a.e31, b.e03, a.e12, b.e02, -a.e02, b.e12, a.e03, b.e31),
-          .e02 = dot(a.e23, b.e03, -a.e12, b.e01, a.e01, b.e12, -a.e03, b.e23),
-          .e03 = dot(-a.e23, b.e02, a.e31, b.e01, -a.e01, b.e31, a.e02, b.e23),
-          .e0123 = dot(a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02, b.e31, a.e03,
-                       b.e12)};
+          .e01 = dot(-a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02),
+          .e02 = dot(a.e01, b.e12, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01),
+          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, -a.e23, b.e02, a.e31, b.e01),
+          .e0123 = dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e23, b.e01, a.e31, b.e02, a.e12,
+                       b.e03)};
 }
 
 /// gp: Even Even -> Even
@@ -152,18 +192,39 @@ template <class S>
 /// Cost: 48 mul, 40 add (32 fused).  Sparsity: 48 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e01 = four(b.e01, b.e02, b.e03, b.e0123);
+      const auto sum1 =
+          dot(four(a.s), four_b_s, four(a.e23), turned<-2, 1, 4, -3>(four_b_s), four(a.e31),
+              turned<-3, -4, 1, 2>(four_b_s), four(a.e12), turned<-4, 3, -2, 1>(four_b_s));
+      const auto sum2 =
+          dot(four(a.e01), turned<1, 4, -3, 2>(four_b_s), four(a.e02),
+              turned<-4, 1, 2, 3>(four_b_s), four(a.e03), turned<3, -2, 1, 4>(four_b_s),
+              four(a.e0123), turned<-2, -3, -4, 1>(four_b_s), four(a.s), four_b_e01, four(a.e23),
+              turned<-4, 3, -2, 1>(four_b_e01), four(a.e31), turned<-3, -4, 1, 2>(four_b_e01),
+              four(a.e12), turned<2, -1, -4, 3>(four_b_e01));
+      Even<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, sum2);
+      return result;
+    }
+  }
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12),
           .e23 = dot(a.s, b.e23, a.e23, b.s, -a.e31, b.e12, a.e12, b.e31),
           .e31 = dot(a.s, b.e31, a.e23, b.e12, a.e31, b.s, -a.e12, b.e23),
           .e12 = dot(a.s, b.e12, -a.e23, b.e31, a.e31, b.e23, a.e12, b.s),
-          .e01 = dot(a.s, b.e01, -a.e23, b.e0123, -a.e31, b.e03, a.e12, b.e02, a.e01, b.s, -a.e02,
-                     b.e12, a.e03, b.e31, -a.e0123, b.e23),
-          .e02 = dot(a.s, b.e02, a.e23, b.e03, -a.e31, b.e0123, -a.e12, b.e01, a.e01, b.e12, a.e02,
-                     b.s, -a.e03, b.e23, -a.e0123, b.e31),
-          .e03 = dot(a.s, b.e03, -a.e23, b.e02, a.e31, b.e01, -a.e12, b.e0123, -a.e01, b.e31, a.e02,
-                     b.e23, a.e03, b.s, -a.e0123, b.e12),
-          .e0123 = dot(a.s, b.e0123, a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02,
-                       b.e31, a.e03, b.e12, a.e0123, b.s)};
+          .e01 = dot(a.e01, b.s, -a.e02, b.e12, a.e03, b.e31, -a.e0123, b.e23, a.s, b.e01, -a.e23,
+                     b.e0123, -a.e31, b.e03, a.e12, b.e02),
+          .e02 = dot(a.e01, b.e12, a.e02, b.s, -a.e03, b.e23, -a.e0123, b.e31, a.s, b.e02, a.e23,
+                     b.e03, -a.e31, b.e0123, -a.e12, b.e01),
+          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.s, -a.e0123, b.e12, a.s, b.e03, -a.e23,
+                     b.e02, a.e31, b.e01, -a.e12, b.e0123),
+          .e0123 = dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e0123, b.s, a.s, b.e0123, a.e23,
+                       b.e01, a.e31, b.e02, a.e12, b.e03)};
 }
 
 /// gp: Plane Plane -> Even
@@ -190,9 +251,9 @@ template <class S>
           .e23 = S(0),
           .e31 = S(0),
           .e12 = S(0),
-          .e01 = -b.e032 + a.e032,
-          .e02 = -b.e013 + a.e013,
-          .e03 = -b.e021 + a.e021,
+          .e01 = a.e032 - b.e032,
+          .e02 = a.e013 - b.e013,
+          .e03 = a.e021 - b.e021,
           .e0123 = S(0)};
 }
 
@@ -201,14 +262,14 @@ template <class S>
 /// Cost: 28 mul, 20 add (16 fused).  Sparsity: 28 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Odd<S> gp(const Even<S>& a, const Plane<S>& p) noexcept {
-  return {.e0 = dot(a.s, p.e0, a.e01, p.e1, a.e02, p.e2, a.e03, p.e3),
+  return {.e0 = dot(a.e01, p.e1, a.e02, p.e2, a.e03, p.e3, a.s, p.e0),
           .e1 = dot(a.s, p.e1, -a.e31, p.e3, a.e12, p.e2),
           .e2 = dot(a.s, p.e2, a.e23, p.e3, -a.e12, p.e1),
           .e3 = dot(a.s, p.e3, -a.e23, p.e2, a.e31, p.e1),
           .e123 = dot(a.e23, p.e1, a.e31, p.e2, a.e12, p.e3),
-          .e032 = dot(-a.e23, p.e0, -a.e02, p.e3, a.e03, p.e2, -a.e0123, p.e1),
-          .e013 = dot(-a.e31, p.e0, a.e01, p.e3, -a.e03, p.e1, -a.e0123, p.e2),
-          .e021 = dot(-a.e12, p.e0, -a.e01, p.e2, a.e02, p.e1, -a.e0123, p.e3)};
+          .e032 = dot(-a.e02, p.e3, a.e03, p.e2, -a.e0123, p.e1, -a.e23, p.e0),
+          .e013 = dot(a.e01, p.e3, -a.e03, p.e1, -a.e0123, p.e2, -a.e31, p.e0),
+          .e021 = dot(-a.e01, p.e2, a.e02, p.e1, -a.e0123, p.e3, -a.e12, p.e0)};
 }
 
 /// gp: Even Trivector -> Odd
@@ -216,14 +277,14 @@ template <class S>
 /// Cost: 20 mul, 12 add (8 fused).  Sparsity: 20 of 32 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Odd<S> gp(const Even<S>& a, const Trivector<S>& t) noexcept {
-  return {.e0 = dot(a.e23, t.e032, a.e31, t.e013, a.e12, t.e021, -a.e0123, t.e123),
+  return {.e0 = dot(-a.e0123, t.e123, a.e23, t.e032, a.e31, t.e013, a.e12, t.e021),
           .e1 = -a.e23 * t.e123,
           .e2 = -a.e31 * t.e123,
           .e3 = -a.e12 * t.e123,
           .e123 = a.s * t.e123,
-          .e032 = dot(a.s, t.e032, -a.e31, t.e021, a.e12, t.e013, -a.e01, t.e123),
-          .e013 = dot(a.s, t.e013, a.e23, t.e021, -a.e12, t.e032, -a.e02, t.e123),
-          .e021 = dot(a.s, t.e021, -a.e23, t.e013, a.e31, t.e032, -a.e03, t.e123)};
+          .e032 = dot(-a.e01, t.e123, a.s, t.e032, -a.e31, t.e021, a.e12, t.e013),
+          .e013 = dot(-a.e02, t.e123, a.s, t.e013, a.e23, t.e021, -a.e12, t.e032),
+          .e021 = dot(-a.e03, t.e123, a.s, t.e021, -a.e23, t.e013, a.e31, t.e032)};
 }
 
 /// gp: Plane Bivector -> Odd
@@ -252,9 +313,9 @@ template <class S>
           .e2 = -b.e31 * t.e123,
           .e3 = -b.e12 * t.e123,
           .e123 = S(0),
-          .e032 = dot(-b.e31, t.e021, b.e12, t.e013, -b.e01, t.e123),
-          .e013 = dot(b.e23, t.e021, -b.e12, t.e032, -b.e02, t.e123),
-          .e021 = dot(-b.e23, t.e013, b.e31, t.e032, -b.e03, t.e123)};
+          .e032 = dot(-b.e01, t.e123, -b.e31, t.e021, b.e12, t.e013),
+          .e013 = dot(-b.e02, t.e123, b.e23, t.e021, -b.e12, t.e032),
+          .e021 = dot(-b.e03, t.e123, -b.e23, t.e013, b.e31, t.e032)};
 }
 
 /// outer: Plane Plane -> Bivector
@@ -290,9 +351,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> outer(const Bivector<S>& b,
                                                           const Plane<S>& p) noexcept {
   return {.e123 = dot(b.e23, p.e1, b.e31, p.e2, b.e12, p.e3),
-          .e032 = dot(-b.e23, p.e0, -b.e02, p.e3, b.e03, p.e2),
-          .e013 = dot(-b.e31, p.e0, b.e01, p.e3, -b.e03, p.e1),
-          .e021 = dot(-b.e12, p.e0, -b.e01, p.e2, b.e02, p.e1)};
+          .e032 = dot(-b.e02, p.e3, b.e03, p.e2, -b.e23, p.e0),
+          .e013 = dot(b.e01, p.e3, -b.e03, p.e1, -b.e31, p.e0),
+          .e021 = dot(-b.e01, p.e2, b.e02, p.e1, -b.e12, p.e0)};
 }
 
 /// outer: Bivector Bivector -> Pseudoscalar
@@ -301,8 +362,8 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Pseudoscalar<S> outer(const Bivector<S>& a,
                                                              const Bivector<S>& b) noexcept {
-  return {.e0123 = dot(a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02, b.e31, a.e03,
-                       b.e12)};
+  return {.e0123 = dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e23, b.e01, a.e31, b.e02, a.e12,
+                       b.e03)};
 }
 
 /// outer: Plane Trivector -> Pseudoscalar
@@ -320,9 +381,9 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> regressive(const Point<S>& a,
                                                               const Point<S>& b) noexcept {
-  return {.e23 = b.e032 - a.e032,
-          .e31 = b.e013 - a.e013,
-          .e12 = b.e021 - a.e021,
+  return {.e23 = -a.e032 + b.e032,
+          .e31 = -a.e013 + b.e013,
+          .e12 = -a.e021 + b.e021,
           .e01 = dot(a.e013, b.e021, -a.e021, b.e013),
           .e02 = dot(-a.e032, b.e021, a.e021, b.e032),
           .e03 = dot(a.e032, b.e013, -a.e013, b.e032)};
@@ -348,9 +409,9 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> regressive(const Trivector<S>& a,
                                                               const Trivector<S>& b) noexcept {
-  return {.e23 = dot(a.e123, b.e032, -a.e032, b.e123),
-          .e31 = dot(a.e123, b.e013, -a.e013, b.e123),
-          .e12 = dot(a.e123, b.e021, -a.e021, b.e123),
+  return {.e23 = dot(-a.e032, b.e123, a.e123, b.e032),
+          .e31 = dot(-a.e013, b.e123, a.e123, b.e013),
+          .e12 = dot(-a.e021, b.e123, a.e123, b.e021),
           .e01 = dot(a.e013, b.e021, -a.e021, b.e013),
           .e02 = dot(-a.e032, b.e021, a.e021, b.e032),
           .e03 = dot(a.e032, b.e013, -a.e013, b.e032)};
@@ -386,7 +447,7 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S regressive(const Bivector<S>& a,
                                                     const Bivector<S>& b) noexcept {
-  return dot(a.e23, b.e01, a.e31, b.e02, a.e12, b.e03, a.e01, b.e23, a.e02, b.e31, a.e03, b.e12);
+  return dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e23, b.e01, a.e31, b.e02, a.e12, b.e03);
 }
 
 /// regressive: Plane Point -> Scalar
@@ -473,9 +534,9 @@ template <class S>
   return {.e23 = dot(-a.e31, b.e12, a.e12, b.e31),
           .e31 = dot(a.e23, b.e12, -a.e12, b.e23),
           .e12 = dot(-a.e23, b.e31, a.e31, b.e23),
-          .e01 = dot(-a.e31, b.e03, a.e12, b.e02, -a.e02, b.e12, a.e03, b.e31),
-          .e02 = dot(a.e23, b.e03, -a.e12, b.e01, a.e01, b.e12, -a.e03, b.e23),
-          .e03 = dot(-a.e23, b.e02, a.e31, b.e01, -a.e01, b.e31, a.e02, b.e23)};
+          .e01 = dot(-a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02),
+          .e02 = dot(a.e01, b.e12, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01),
+          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, -a.e23, b.e02, a.e31, b.e01)};
 }
 
 /// commutator: Point Bivector -> Direction
@@ -519,9 +580,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> commutator(const Trivector<S>& t,
                                                                const Bivector<S>& b) noexcept {
   return {.e123 = S(0),
-          .e032 = dot(b.e01, t.e123, -b.e12, t.e013, b.e31, t.e021),
-          .e013 = dot(b.e02, t.e123, b.e12, t.e032, -b.e23, t.e021),
-          .e021 = dot(b.e03, t.e123, -b.e31, t.e032, b.e23, t.e013)};
+          .e032 = dot(-b.e12, t.e013, b.e31, t.e021, b.e01, t.e123),
+          .e013 = dot(b.e12, t.e032, -b.e23, t.e021, b.e02, t.e123),
+          .e021 = dot(-b.e31, t.e032, b.e23, t.e013, b.e03, t.e123)};
 }
 
 /// sandwich: Motor Point -> Point
@@ -1837,9 +1898,9 @@ template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Translator<S> gp(const Translator<S>& a,
                                                         const Translator<S>& b) noexcept {
   return {.s = a.s * b.s,
-          .e01 = dot(a.s, b.e01, a.e01, b.s),
-          .e02 = dot(a.s, b.e02, a.e02, b.s),
-          .e03 = dot(a.s, b.e03, a.e03, b.s)};
+          .e01 = dot(a.e01, b.s, a.s, b.e01),
+          .e02 = dot(a.e02, b.s, a.s, b.e02),
+          .e03 = dot(a.e03, b.s, a.s, b.e03)};
 }
 
 /// reverse: Translator -> Translator

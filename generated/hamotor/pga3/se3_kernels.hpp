@@ -25,9 +25,9 @@ template <class S>
   return {.w23 = dot(a.w31, b.w12, -a.w12, b.w31),
           .w31 = dot(-a.w23, b.w12, a.w12, b.w23),
           .w12 = dot(a.w23, b.w31, -a.w31, b.w23),
-          .v1 = dot(a.w31, b.v3, -a.w12, b.v2, a.v2, b.w12, -a.v3, b.w31),
-          .v2 = dot(-a.w23, b.v3, a.w12, b.v1, -a.v1, b.w12, a.v3, b.w23),
-          .v3 = dot(a.w23, b.v2, -a.w31, b.v1, a.v1, b.w31, -a.v2, b.w23)};
+          .v1 = dot(a.v2, b.w12, -a.v3, b.w31, a.w31, b.v3, -a.w12, b.v2),
+          .v2 = dot(-a.v1, b.w12, a.v3, b.w23, -a.w23, b.v3, a.w12, b.v1),
+          .v3 = dot(a.v1, b.w31, -a.v2, b.w23, a.w23, b.v2, -a.w31, b.v1)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
@@ -36,9 +36,9 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> coadjoint(
     const se3::Rate<S>& w, const se3::Momentum<S>& mu) noexcept {
-  return {.l23 = dot(-mu.l12, w.w31, mu.l31, w.w12, -mu.p3, w.v2, mu.p2, w.v3),
-          .l31 = dot(mu.l12, w.w23, -mu.l23, w.w12, mu.p3, w.v1, -mu.p1, w.v3),
-          .l12 = dot(-mu.l31, w.w23, mu.l23, w.w31, -mu.p2, w.v1, mu.p1, w.v2),
+  return {.l23 = dot(-mu.p3, w.v2, mu.p2, w.v3, -mu.l12, w.w31, mu.l31, w.w12),
+          .l31 = dot(mu.p3, w.v1, -mu.p1, w.v3, mu.l12, w.w23, -mu.l23, w.w12),
+          .l12 = dot(-mu.p2, w.v1, mu.p1, w.v2, -mu.l31, w.w23, mu.l23, w.w31),
           .p1 = dot(-mu.p3, w.w31, mu.p2, w.w12),
           .p2 = dot(mu.p3, w.w23, -mu.p1, w.w12),
           .p3 = dot(-mu.p2, w.w23, mu.p1, w.w31)};
@@ -60,14 +60,14 @@ template <class S>
           .e23 = dot(-half_w23, m.s, half_w12, m.e31, -half_w31, m.e12),
           .e31 = dot(-half_w31, m.s, -half_w12, m.e23, half_w23, m.e12),
           .e12 = dot(-half_w12, m.s, half_w31, m.e23, -half_w23, m.e31),
-          .e01 = dot(-half_v1, m.s, half_v3, m.e31, -half_v2, m.e12, half_w12, m.e02, -half_w31,
-                     m.e03, half_w23, m.e0123),
-          .e02 = dot(-half_v2, m.s, -half_v3, m.e23, half_v1, m.e12, -half_w12, m.e01, half_w23,
-                     m.e03, half_w31, m.e0123),
-          .e03 = dot(-half_v3, m.s, half_v2, m.e23, -half_v1, m.e31, half_w31, m.e01, -half_w23,
-                     m.e02, half_w12, m.e0123),
-          .e0123 = dot(-half_v1, m.e23, -half_v2, m.e31, -half_v3, m.e12, -half_w23, m.e01,
-                       -half_w31, m.e02, -half_w12, m.e03)};
+          .e01 = dot(half_w12, m.e02, -half_w31, m.e03, half_w23, m.e0123, -half_v1, m.s, half_v3,
+                     m.e31, -half_v2, m.e12),
+          .e02 = dot(-half_w12, m.e01, half_w23, m.e03, half_w31, m.e0123, -half_v2, m.s, -half_v3,
+                     m.e23, half_v1, m.e12),
+          .e03 = dot(half_w31, m.e01, -half_w23, m.e02, half_w12, m.e0123, -half_v3, m.s, half_v2,
+                     m.e23, -half_v1, m.e31),
+          .e0123 = dot(-half_w23, m.e01, -half_w31, m.e02, -half_w12, m.e03, -half_v1, m.e23,
+                       -half_v2, m.e31, -half_v3, m.e12)};
 }
 
 /// Ad: Motor Rate -> Rate

@@ -8,6 +8,7 @@
 
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/sta/elements.hpp"
 
 namespace hamotor::sta {
@@ -21,6 +22,30 @@ using hamotor::select;
 /// Cost: 64 mul, 56 add (48 fused).  Sparsity: 64 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> gp(const Rotor<S>& a, const Rotor<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e10 = four(b.e10, b.e20, b.e30, b.e0123);
+      const auto sum1 =
+          dot(four(a.s), four_b_s, four(a.e23), turned<-2, 1, -4, 3>(four_b_s), four(a.e31),
+              turned<-3, 4, 1, -2>(four_b_s), four(a.e12), turned<-4, -3, 2, 1>(four_b_s),
+              four(a.e10), turned<1, -4, 3, -2>(four_b_e10), four(a.e20),
+              turned<2, -3, -4, 1>(four_b_e10), four(a.e30), turned<3, 2, -1, -4>(four_b_e10),
+              four(a.e0123), turned<-4, -1, -2, -3>(four_b_e10));
+      const auto sum2 = dot(
+          four(a.s), turned<1, 4, 3, 2>(four_b_e10), four(a.e23), turned<4, -1, 2, -3>(four_b_e10),
+          four(a.e31), turned<3, -2, -1, 4>(four_b_e10), four(a.e12),
+          turned<-2, -3, 4, 1>(four_b_e10), four(a.e10), turned<1, -2, 3, -4>(four_b_s),
+          four(a.e20), turned<4, -3, -2, 1>(four_b_s), four(a.e30), turned<-3, -4, 1, 2>(four_b_s),
+          four(a.e0123), turned<2, 1, 4, 3>(four_b_s));
+      Rotor<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, turned<1, 4, 3, 2>(sum2));
+      return result;
+    }
+  }
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, a.e10, b.e10, a.e20,
                    b.e20, a.e30, b.e30, -a.e0123, b.e0123),
           .e23 = dot(a.s, b.e23, a.e23, b.s, a.e31, b.e12, -a.e12, b.e31, -a.e10, b.e0123, -a.e20,
@@ -44,6 +69,30 @@ template <class S>
 /// Cost: 64 mul, 56 add (48 fused).  Sparsity: 64 of 64 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Even<S> gp(const Even<S>& a, const Even<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto four_b_s = four(b.s, b.e23, b.e31, b.e12);
+      const auto four_b_e10 = four(b.e10, b.e20, b.e30, b.e0123);
+      const auto sum1 =
+          dot(four(a.s), four_b_s, four(a.e23), turned<-2, 1, -4, 3>(four_b_s), four(a.e31),
+              turned<-3, 4, 1, -2>(four_b_s), four(a.e12), turned<-4, -3, 2, 1>(four_b_s),
+              four(a.e10), turned<1, -4, 3, -2>(four_b_e10), four(a.e20),
+              turned<2, -3, -4, 1>(four_b_e10), four(a.e30), turned<3, 2, -1, -4>(four_b_e10),
+              four(a.e0123), turned<-4, -1, -2, -3>(four_b_e10));
+      const auto sum2 = dot(
+          four(a.s), turned<1, 4, 3, 2>(four_b_e10), four(a.e23), turned<4, -1, 2, -3>(four_b_e10),
+          four(a.e31), turned<3, -2, -1, 4>(four_b_e10), four(a.e12),
+          turned<-2, -3, 4, 1>(four_b_e10), four(a.e10), turned<1, -2, 3, -4>(four_b_s),
+          four(a.e20), turned<4, -3, -2, 1>(four_b_s), four(a.e30), turned<-3, -4, 1, 2>(four_b_s),
+          four(a.e0123), turned<2, 1, 4, 3>(four_b_s));
+      Even<S> result;
+      lanes::store<0>(result, sum1);
+      lanes::store<4>(result, turned<1, 4, 3, 2>(sum2));
+      return result;
+    }
+  }
   return {.s = dot(a.s, b.s, -a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, a.e10, b.e10, a.e20,
                    b.e20, a.e30, b.e30, -a.e0123, b.e0123),
           .e23 = dot(a.s, b.e23, a.e23, b.s, a.e31, b.e12, -a.e12, b.e31, -a.e10, b.e0123, -a.e20,

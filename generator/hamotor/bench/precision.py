@@ -83,8 +83,8 @@ QUICK: Final = Extent(
     3, 2.0, 0.01, 0.02, False, COMPILERS[:1],
     methods=("rkmk4", "rk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
-_TYPICAL_S: Final = {"whole": 100.0, "part": 40.0, "quick": 35.0}
-"""What a problem takes on two cores of 3 GHz, without long runs."""
+_TYPICAL_S: Final = {"whole": 230.0, "part": 150.0, "quick": 35.0}
+"""What a problem takes on two cores of 3 GHz with public solvers, without long runs."""
 _LONG_RUNS: Final = 12.0
 """How many times as long as one of a problem's long runs may take all of them take."""
 

@@ -34,6 +34,8 @@ INLINED_OPERATIONS = 128
 them the way of a result through memory costs more than the arithmetic."""
 INLINED_WITH_CALLS = 320
 """exp, log, normalize and their like may come to so many with the functions that they call."""
+PACKED_OPERATIONS = 48
+"""Kernels of at least so many operations are written four lanes at a time where they can be."""
 PACKED = "if constexpr (lanes::packed<S>) {"
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
@@ -248,10 +250,10 @@ def _operations_of_calls(program: Program) -> int:
 
 
 def _packed_body(kernel: Kernel) -> list[str]:
-    """What a long kernel does first, where the scalar and the processor allow it."""
+    """What a kernel of many operations does first, where the scalar and the processor allow it."""
     cost = kernel.program.cost
-    packed = lanes.packed_lines(kernel.program) if cost.total > INLINED_OPERATIONS else None
-    if packed is None or cost.calls:
+    packed = lanes.packed_lines(kernel.program, whole=cost.total <= INLINED_OPERATIONS)
+    if packed is None or cost.calls or cost.total < PACKED_OPERATIONS:
         return []
     return [
         PACKED,

@@ -133,7 +133,8 @@ def product_kernel(
     """A bilinear product, read off in `result`; `factor` multiplies it."""
     a, b = parameters_for(left, right)
     value = poly.apply_bilinear(product, value_of(a), value_of(b))
-    meaning = {n: poly.scaled(p, factor) for n, p in read_off(value, result).items()}
+    late = _translating(algebra, value_of(b))
+    meaning = {n: _last(poly.scaled(p, factor), late) for n, p in read_off(value, result).items()}
     kept = {m for p in meaning.values() for m in p}
     pairs = (len(kept), (len(a.element.blades)) * (len(b.element.blades)))
     program = direct_program((a, b), meaning, result)
@@ -147,6 +148,15 @@ def product_kernel(
         if scaled is not None and scaled.cost.total <= program.cost.total:
             program = scaled
     return proved(Kernel(name, law, program, meaning, namespace, pairs))
+
+
+def _last(polynomial: Polynomial, names: frozenset[str]) -> Polynomial:
+    """The same terms, those with one of the names last.
+
+    Of a motor the translation is computed last, and where it is the next product's second operand,
+    fewer additions then wait for it.
+    """
+    return {m: polynomial[m] for m in sorted(polynomial, key=lambda m: not names.isdisjoint(m))}
 
 
 def _operand_scaled(

@@ -31,14 +31,19 @@ class _Unpackable(Exception):
     """These expressions are not one expression of vectors."""
 
 
-def packed_lines(program: Program) -> list[str] | None:
-    """Statements of the function body; None where not every sum of products is one of four."""
+def packed_lines(program: Program, *, whole: bool) -> list[str] | None:
+    """Statements of the function body; None where not every sum of products is one of four.
+
+    whole: None as well where a component of the result is none of these sums.
+    """
     statements = [*program.bindings, *program.outputs]
     groups: dict[tuple[str, ...], list[str]] = {}
     for name, expression in statements:
         if key := _key(expression):
             groups.setdefault(key, []).append(name)
     if not groups or any(len(names) % WIDTH for names in groups.values()):
+        return None
+    if whole and not all(_key(expression) for _, expression in program.outputs):
         return None
     wanted = dict(statements)
     packer = _Packer(program)
@@ -200,12 +205,16 @@ class _Packer:
         self.loads: list[str] = []
 
     def best_order(self, names: Sequence[str], wanted: Mapping[str, Expression]) -> list[str]:
-        """The order of lanes that takes the fewest shuffles that no other sum takes."""
+        """The order of lanes that takes the fewest shuffles that no other sum takes.
+
+        One of the result counts as three: all else is behind it.
+        """
         kept = dict(self._registers), set(self._shuffles), list(self.loads)
         found = []
         for order in permutations(names):
             self.text([wanted[name] for name in order])
-            found.append((len(self._shuffles) + (list(order) != list(names)), list(order)))
+            turned = list(order) != list(names)
+            found.append((len(self._shuffles) + 3 * turned, list(order)))
             self._registers, self._shuffles, self.loads = (
                 dict(kept[0]),
                 set(kept[1]),
@@ -277,7 +286,7 @@ class _Packer:
                 raise _Unpackable  # not blocks of components: more loads than it saves
             order = sorted(names, key=self._first_place)
             self._registers[key] = order
-            loaded = self._sum(order) or self._loaded(order)
+            loaded = self._sum(order) or f"four({', '.join(order)})"
             self.loads.append(f"const auto {self._name(order)} = {loaded};")
         return self._registers[key]
 
@@ -303,15 +312,6 @@ class _Packer:
                 return ""
             sides.append(self._lanes([s for s, _ in part], [x for _, x in part]))
         return _added(*sides)
-
-    def _loaded(self, names: Sequence[str]) -> str:
-        """Four components that stand side by side, or four numbers."""
-        places = [self._place.get(name) for name in names]
-        if first := places[0]:
-            parameter, index = first
-            if places == [(parameter, index + k) for k in range(WIDTH)]:
-                return f"lanes::load<S, {index}>({parameter})"
-        return f"four({', '.join(names)})"
 
     @staticmethod
     def _name(register: list[str]) -> str:

@@ -49,18 +49,7 @@ template <class S>
   return {typename Four<S>::Lanes{a, b, c, d}};
 }
 
-/// Four components of an element that follow each other, from component `first` on.  Written with
-/// the components' names, g++ gathers and scatters them one by one.
-template <class S, int first, class T>
-[[nodiscard]] HAMOTOR_INLINE inline Four<S> load(const T& element) noexcept {
-  static_assert(std::is_trivially_copyable_v<T> && sizeof(T) >= (first + 4) * sizeof(S));
-  Four<S> loaded;
-  std::memcpy(&loaded.lanes, reinterpret_cast<const char*>(&element) + first * sizeof(S),
-              4 * sizeof(S));
-  return loaded;
-}
-
-/// The reverse of `load`.
+/// Four components of an element that follow each other, from component `first` on.
 template <int first, class T, class S>
 HAMOTOR_INLINE inline void store(T& element, const Four<S>& x) noexcept {
   static_assert(std::is_trivially_copyable_v<T> && sizeof(T) >= (first + 4) * sizeof(S));
@@ -78,13 +67,31 @@ HAMOTOR_INLINE inline void store(T& element, const Four<S>& x) noexcept {
   return {_mm_fmadd_ps(a.lanes, b.lanes, c.lanes)};
 }
 
+/// Lanes in another order, counted from 0.  Within a half of 256 bits a lane moves in a cycle,
+/// across halves in three to six, by processor: where that does, halves are exchanged once, for all
+/// orders.
+template <int a, int b, int c, int d>
+[[nodiscard]] HAMOTOR_INLINE inline __m256d permuted(__m256d x) noexcept {
+  if constexpr (a / 2 == c / 2 || b / 2 == d / 2) {
+    return __builtin_shufflevector(x, x, a, b, c, d);
+  } else {
+    constexpr int odd = a % 2 + 2 * (b % 2) + 4 * (c % 2) + 8 * (d % 2);
+    const __m256d exchanged = _mm256_permute2f128_pd(x, x, 1);
+    return _mm256_shuffle_pd(a < 2 ? x : exchanged, b < 2 ? x : exchanged, odd);
+  }
+}
+
+template <int a, int b, int c, int d>
+[[nodiscard]] HAMOTOR_INLINE inline __m128 permuted(__m128 x) noexcept {
+  return __builtin_shufflevector(x, x, a, b, c, d);
+}
+
 /// Lanes in another order and with other signs: −2 is the second lane, negated.
 template <int a, int b, int c, int d, class S>
 [[nodiscard]] HAMOTOR_INLINE inline Four<S> turned(const Four<S>& x) noexcept {
   constexpr auto lane = [](int k) { return (k < 0 ? -k : k) - 1; };
   constexpr auto sign = [](int k) { return k < 0 ? S(-0.0) : S(0); };
-  const typename Four<S>::Lanes moved =
-      __builtin_shufflevector(x.lanes, x.lanes, lane(a), lane(b), lane(c), lane(d));
+  const auto moved = permuted<lane(a), lane(b), lane(c), lane(d)>(x.lanes);
   if constexpr (a > 0 && b > 0 && c > 0 && d > 0) {
     return {moved};
   } else if constexpr (std::is_same_v<S, double>) {
@@ -107,8 +114,6 @@ inline constexpr bool packed = false;
 
 template <class S, class... Rest>
 [[nodiscard]] S four(const S& x, const Rest&... rest) noexcept;
-template <class S, int first, class T>
-[[nodiscard]] S load(const T& element) noexcept;
 template <int first, class T, class S>
 void store(T& element, const S& x) noexcept;
 template <int a, int b, int c, int d, class S>
