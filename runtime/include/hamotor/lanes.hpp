@@ -2,6 +2,7 @@
 // four components.  Lane by lane the same operations as `dot` on scalars, and so the same bits.
 #pragma once
 
+#include <cstdint>
 #include <cstring>
 #include <type_traits>
 
@@ -9,7 +10,6 @@
 
 #if defined(__FMA__) && defined(__x86_64__) && defined(__GNUC__)
 #define HAMOTOR_LANES 1
-#include <immintrin.h>
 #endif
 
 namespace hamotor::lanes {
@@ -20,7 +20,8 @@ namespace hamotor::lanes {
 template <class S>
 inline constexpr bool packed = std::is_same_v<S, double> || std::is_same_v<S, float>;
 
-/// Four numbers.
+/// Four numbers.  Compilers' vectors and built-in functions serve: <immintrin.h> would take longer
+/// to read than the kernels of pga3.
 template <class S>
 struct Four {
   using Lanes [[gnu::vector_size(4 * sizeof(S))]] = S;
@@ -56,34 +57,37 @@ HAMOTOR_INLINE inline void store(T& element, const Four<S>& x) noexcept {
   std::memcpy(reinterpret_cast<char*>(&element) + first * sizeof(S), &x.lanes, 4 * sizeof(S));
 }
 
-[[nodiscard]] HAMOTOR_INLINE inline Four<double> mul_add(const Four<double>& a,
-                                                         const Four<double>& b,
-                                                         const Four<double>& c) noexcept {
-  return {_mm256_fmadd_pd(a.lanes, b.lanes, c.lanes)};
-}
-
-[[nodiscard]] HAMOTOR_INLINE inline Four<float> mul_add(const Four<float>& a, const Four<float>& b,
-                                                        const Four<float>& c) noexcept {
-  return {_mm_fmadd_ps(a.lanes, b.lanes, c.lanes)};
+template <class S>
+[[nodiscard]] HAMOTOR_INLINE inline Four<S> mul_add(const Four<S>& a, const Four<S>& b,
+                                                    const Four<S>& c) noexcept {
+#if __has_builtin(__builtin_elementwise_fma)
+  return {__builtin_elementwise_fma(a.lanes, b.lanes, c.lanes)};
+#else
+  if constexpr (std::is_same_v<S, double>) {
+    return {__builtin_ia32_vfmaddpd256(a.lanes, b.lanes, c.lanes)};
+  } else {
+    return {__builtin_ia32_vfmaddps(a.lanes, b.lanes, c.lanes)};
+  }
+#endif
 }
 
 /// Lanes in another order, counted from 0.  Within a half of 256 bits a lane moves in a cycle,
 /// across halves in three to six, by processor: where that does, halves are exchanged once, for all
 /// orders.
-template <int a, int b, int c, int d>
-[[nodiscard]] HAMOTOR_INLINE inline __m256d permuted(__m256d x) noexcept {
-  if constexpr (a / 2 == c / 2 || b / 2 == d / 2) {
-    return __builtin_shufflevector(x, x, a, b, c, d);
+template <int a, int b, int c, int d, class S>
+[[nodiscard]] HAMOTOR_INLINE inline auto permuted(const Four<S>& x) noexcept {
+  constexpr bool from_both_halves = a / 2 != c / 2 && b / 2 != d / 2;
+  if constexpr (std::is_same_v<S, double> && from_both_halves) {
+#if __has_builtin(__builtin_ia32_vperm2f128_pd256)
+    const auto exchanged = __builtin_ia32_vperm2f128_pd256(x.lanes, x.lanes, 1);
+#else
+    const auto exchanged = __builtin_shufflevector(x.lanes, x.lanes, 2, 3, 0, 1);
+#endif
+    return __builtin_shufflevector(a < 2 ? x.lanes : exchanged, b < 2 ? x.lanes : exchanged, a % 2,
+                                   4 + b % 2, 2 + c % 2, 6 + d % 2);
   } else {
-    constexpr int odd = a % 2 + 2 * (b % 2) + 4 * (c % 2) + 8 * (d % 2);
-    const __m256d exchanged = _mm256_permute2f128_pd(x, x, 1);
-    return _mm256_shuffle_pd(a < 2 ? x : exchanged, b < 2 ? x : exchanged, odd);
+    return __builtin_shufflevector(x.lanes, x.lanes, a, b, c, d);
   }
-}
-
-template <int a, int b, int c, int d>
-[[nodiscard]] HAMOTOR_INLINE inline __m128 permuted(__m128 x) noexcept {
-  return __builtin_shufflevector(x, x, a, b, c, d);
 }
 
 /// Lanes in another order and with other signs: −2 is the second lane, negated.
@@ -91,13 +95,25 @@ template <int a, int b, int c, int d, class S>
 [[nodiscard]] HAMOTOR_INLINE inline Four<S> turned(const Four<S>& x) noexcept {
   constexpr auto lane = [](int k) { return (k < 0 ? -k : k) - 1; };
   constexpr auto sign = [](int k) { return k < 0 ? S(-0.0) : S(0); };
-  const auto moved = permuted<lane(a), lane(b), lane(c), lane(d)>(x.lanes);
+  const typename Four<S>::Lanes moved = permuted<lane(a), lane(b), lane(c), lane(d)>(x);
   if constexpr (a > 0 && b > 0 && c > 0 && d > 0) {
     return {moved};
-  } else if constexpr (std::is_same_v<S, double>) {
-    return {_mm256_xor_pd(moved, _mm256_setr_pd(sign(a), sign(b), sign(c), sign(d)))};
   } else {
-    return {_mm_xor_ps(moved, _mm_setr_ps(sign(a), sign(b), sign(c), sign(d)))};
+#if __has_builtin(__builtin_ia32_xorpd256)
+    // g++ takes the integers' instruction otherwise, whose result floating point waits for.
+    constexpr typename Four<S>::Lanes signs{sign(a), sign(b), sign(c), sign(d)};
+    if constexpr (std::is_same_v<S, double>) {
+      return {__builtin_ia32_xorpd256(moved, signs)};
+    } else {
+      return {__builtin_ia32_xorps(moved, signs)};
+    }
+#else
+    using Bits [[gnu::vector_size(4 * sizeof(S))]] =
+        std::conditional_t<std::is_same_v<S, double>, std::int64_t, std::int32_t>;
+    constexpr typename Four<S>::Lanes signs{sign(a), sign(b), sign(c), sign(d)};
+    return {reinterpret_cast<typename Four<S>::Lanes>(reinterpret_cast<Bits>(moved) ^
+                                                      reinterpret_cast<Bits>(signs))};
+#endif
   }
 }
 
