@@ -503,6 +503,8 @@ def _generate(parsed: argparse.Namespace) -> int:
         for option in ("name", "null_pairs", "products"):
             if getattr(parsed, option) is not None:
                 raise UsageError(f"--{option.replace('_', '-')} goes with --signature P,Q,R.")
+        if files := [name for name in parsed.names if name.endswith(".toml")]:
+            raise UsageError(f"{files[0]}: for a spec of your own: --spec {files[0]} --out DIR.")
         differences = generate(parsed.names, check=parsed.check, out=folder)
     if parsed.check and differences:
         listed = "\n".join(f"  {d.kind:<9} {shown}/{d.path}" for d in differences)

@@ -158,6 +158,7 @@ def test_a_rejected_text_exits_with_4(
         ("run toy --method eular", 'unknown method "eular".*Did you mean "euler"'),
         ("run toy extra", "unrecognized arguments: extra"),
         ("generate --signature 3,0,1", "needs --out DIR"),
+        ("generate mine.toml --out x", "mine.toml: for a spec of your own: --spec mine.toml"),
         ("generate --signature 3,0", "must be three whole numbers P,Q,R"),
         ("generate --signature 9,0,0 --out x", "8 are allowed"),
         ("generate --signature 2,0,1 --null-pairs 1 --out x", "null pair"),

@@ -16,9 +16,17 @@ from hamotor.codegen.algebra import Algebra, Blade, grade, reverse_sign
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.library import library
-from hamotor.codegen.spec import AlgebraSpec, bundled_path, read_algebra
+from hamotor.codegen.spec import AlgebraSpec, bundled_path, parse_algebra, read_algebra
+from hamotor.codegen.starter import starter_spec
 
-SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()}
+CLOSED_FORMS = ("inverse", "sqrt", "exp", "log", "cayley", "cayley_inverse", "normalize")
+SIGNATURES = ((1, 0, 1), (1, 0, 3), (2, 2, 0), (2, 1, 2), (3, 1, 1))
+SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()} | {
+    (name := "r" + "".join(map(str, s))): parse_algebra(
+        starter_spec(name, s, products=CLOSED_FORMS), f"{name}.toml"
+    )
+    for s in SIGNATURES
+}
 KERNELS = {name: library(spec) for name, spec in SPECS.items()}
 Value = dict[Blade, Any]
 

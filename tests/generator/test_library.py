@@ -9,9 +9,12 @@ from pathlib import Path
 import pytest
 
 from hamotor.codegen import generate_library, starter_spec
+from hamotor.codegen.library import library as kernels_of
+from hamotor.codegen.spec import parse_algebra
 from hamotor.errors import UsageError
 
 SMALL = ("gp", "outer", "sandwich", "reverse")
+WARNINGS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 
 
 def library(
@@ -35,21 +38,57 @@ def run(*command: str | Path) -> str:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("signature", "null_pairs"),
-    [((2, 0, 1), 0), ((3, 1, 0), 1), ((2, 2, 1), 0), ((1, 1, 0), 0), ((0, 3, 0), 0)],
-    ids=["degenerate", "null pair", "mixed and degenerate", "mixed", "negative"],
+    [
+        ((2, 0, 1), 0),
+        ((3, 1, 0), 1),
+        ((2, 2, 1), 0),
+        ((1, 1, 0), 0),
+        ((0, 3, 0), 0),
+        ((0, 1, 0), 0),
+        ((1, 0, 3), 0),
+    ],
+    ids=[
+        "degenerate",
+        "null pair",
+        "mixed and degenerate",
+        "mixed",
+        "negative",
+        "one dimension",
+        "mostly null",
+    ],
 )
 def test_the_folder_builds_alone_and_its_test_proves_it(
     tmp_path: Path, signature: tuple[int, int, int], null_pairs: int
 ) -> None:
     library(tmp_path / "foo", signature, null_pairs, products=None)
     build = tmp_path / "build"
-    flags = "-DCMAKE_CXX_FLAGS=-O1 -Werror"
+    flags = " ".join(["-DCMAKE_CXX_FLAGS=-O1", *WARNINGS])
     run("cmake", "-G", "Ninja", flags, "-S", tmp_path / "foo", "-B", build)
     run("cmake", "--build", build)
     run("ctest", "--test-dir", build, "--no-tests=error")
     shown = run(build / "foo_test")
     assert "comparisons, 0 failures" in shown
-    assert int(shown.split()[1]) > 100
+    assert int(shown.split()[1]) >= 4 ** sum(signature)
+
+
+@pytest.mark.parametrize(
+    "signature",
+    [(p, q, n - p - q) for n in range(1, 5) for p in range(n + 1) for q in range(n + 1 - p)]
+    + [(3, 1, 1), (1, 3, 1), (2, 1, 2), (0, 1, 4)],
+    ids=lambda signature: ",".join(map(str, signature)),
+)
+def test_every_signature_has_a_library(signature: tuple[int, int, int]) -> None:
+    for null_pairs in range(min(signature[:2]) + 1):
+        text = starter_spec("foo", signature, null_pairs)
+        assert kernels_of(parse_algebra(text, "foo.toml"))
+
+
+def test_the_test_of_few_kernels_compiles_without_warnings(tmp_path: Path) -> None:
+    for product in ("outer", "reverse", "exp"):
+        library(tmp_path / product, (3, 0, 0), products=(product,))
+        source = tmp_path / product / "test" / "foo_test.cpp"
+        include = tmp_path / product / "include"
+        run("g++", "-std=c++20", "-fsyntax-only", *WARNINGS, "-I", include, source)
 
 
 def test_the_same_text_changes_nothing_the_second_time(tmp_path: Path) -> None:

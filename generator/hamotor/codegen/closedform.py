@@ -326,7 +326,8 @@ def _log_by_square(
     c, number_part, root = (polynomial_expression(p) for p in (value[0], square, rho))
     arguments: tuple[Expression, ...] = (c, number_part, root)
     # planes that are not each other's dual: rounding of one is no turn in the other
-    commuting = not all(algebra.blade_product(b, b).get(0) for b in quad) or len(quad) > 1
+    mixed = not all(algebra.blade_product(b, b).get(0) for b in quad) or len(quad) > 1
+    commuting = bool(square) and mixed
     if commuting:
         twisted = _named(algebra, writer, "t", twisted)
     if _may_be_isoclinic(algebra, quad):
@@ -609,6 +610,14 @@ def _named(
     }
 
 
+def _renamed(x: Expression, name: str, multiple: Polynomial) -> Polynomial:
+    """A multiple of x, x under another name; nothing if it is none."""
+    for monomial, factor in multiple.items():
+        if [Name(text) for text in monomial] == [x]:
+            return {(name,): factor}
+    return {}
+
+
 def _times_name(
     algebra: Algebra,
     writer: Writer,
@@ -659,8 +668,8 @@ def cayley_inverse_kernel(
             square = MultiplyAdd(near, near, Product(slip, slip))
             writer.let("inverse", Quotient(inward, square))
             linear = writer.let("linear", Product(near, Name("inverse")))
-            ((blade, p),) = quad.items()
-            quad = {blade: dict.fromkeys((("slip",),), *p.values())}
+            scaled = _times_name(algebra, writer, "q", quad, "scaling.in")
+            quad = {b: _renamed(other, "slip", p) or scaled[b] for b, p in quad.items()}
             inverse = Name("inverse")
         elif omega:
             norm = _norm_squared(algebra, writer, value, rest, divided=True)
@@ -945,13 +954,14 @@ def _mixed_inverse_kernel(
 def _one_plus_scalar(algebra: Algebra, writer: Writer, value: PolynomialMultivector) -> str:
     """Name of 1 + s, s = <M>₀, M ~M = 1; for s ≤ 0 as (1 − s²) / (1 − s), 1 − s² from the others.
 
-    So near M = −1 nothing cancels in it.
+    So near M = −1 nothing cancels in it.  Where there are no others, s is 1 or −1.
     """
     norm = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))[0]
-    rest = poly.added({0: norm}, {0: poly.times(value[0], value[0])}, -1)[0]
+    rest = poly.added({0: norm}, {0: poly.times(value[0], value[0])}, -1).get(0, {})
     s = polynomial_expression(value[0])
+    whole = Sum(ONE, s)
     far = Quotient(polynomial_expression(rest), Sum(ONE, negative(s)))
-    writer.let("shifted", Select(s, Sum(ONE, s), far))
+    writer.let("shifted", Select(s, whole, far) if rest else whole)
     return "shifted"
 
 

@@ -87,7 +87,7 @@ def starter_spec(
         "",
         "# Kernels: LEFT RIGHT -> RESULT; without a result, the smallest element that holds it.",
         "[kernels]",
-        *_kernels(basis, wanted, invertible=r == 0),
+        *_kernels(basis, wanted, rank=p + q),
     ]
     if len(basis) >= 2:
         lines += ["", *_group(basis, [k for k in GROUP_KERNELS if k in wanted])]
@@ -191,9 +191,9 @@ def _elements(basis: Sequence[str]) -> list[str]:
     return lines
 
 
-def _kernels(
-    basis: Sequence[str], wanted: Mapping[str, Sequence[str]], *, invertible: bool
-) -> list[str]:
+def _kernels(basis: Sequence[str], wanted: Mapping[str, Sequence[str]], *, rank: int) -> list[str]:
+    """Requests of each wanted operation.  rank: how many vectors of an orthogonal basis are not
+    null; blades of higher grades have the square 0, and onto them nothing is projected."""
     n = len(basis)
     name = [_grade_name(g, n) for g in range(n + 1)]
     inner_grades = range(1, n)
@@ -227,15 +227,17 @@ def _kernels(
         "commutator": [f"{name[j]} {name[2]} -> {name[j]}" for j in inner_grades if n > 2],
         "anticommutator": [f"{name[1]} {name[1]} -> Scalar"] if n > 1 else [],
         "sandwich": [f"Versor {name[j]}" for j in inner_grades if n < 6 or j == 1],
-        "matrix": [f"Versor {name[1]}"] if n < 6 else [],
+        "matrix": [f"Versor {name[1]}"] if 2 <= n < 6 else [],
         "reverse": (["Versor"] if has_versor else []) + ["Even", "Odd"],
         "grade": [f"Even {g}" for g in range(0, n + 1, 2)]
         + [f"Odd {g}" for g in range(1, n + 1, 2)],
         "complement": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
         "complement_inverse": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
         "polarity": [f"{name[g]} -> {name[n - g]}" for g in inner_grades],
-        "polarity_inverse": [f"{name[g]} -> {name[n - g]}" for g in inner_grades if invertible],
-        "project": [f"{name[i]} {name[j]}" for i in inner_grades for j in inner_grades if i <= j],
+        "polarity_inverse": [f"{name[g]} -> {name[n - g]}" for g in inner_grades if rank == n],
+        "project": [
+            f"{name[i]} {name[j]}" for i in inner_grades for j in inner_grades if i <= j <= rank
+        ],
         "involute": ["Even", "Odd"],
         "conjugate": ["Even", "Odd"],
         "norm": [name[g] for g in inner_grades],
