@@ -91,6 +91,61 @@ def test_the_test_of_few_kernels_compiles_without_warnings(tmp_path: Path) -> No
         run("g++", "-std=c++20", "-fsyntax-only", *WARNINGS, "-I", include, source)
 
 
+ROUND_TRIPS = """
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <random>
+#include "hamotor/foo/foo.hpp"
+
+using namespace hamotor::foo;
+
+template <class T>
+double difference(const T& a, const T& b) {
+  double most = 0.0;
+  double size = 0.0;
+  for (std::size_t i = 0; i < T::size; ++i) {
+    most = std::max(most, std::fabs(a.components()[i] - b.components()[i]));
+    size = std::max(size, std::fabs(b.components()[i]));
+  }
+  return most <= size ? most / size : 1e300;
+}
+
+int main() {
+  std::mt19937 engine(1);
+  std::normal_distribution<double> normal;
+  double worst = 0.0;
+  for (int i = 0; i < 20000; ++i) {
+    std::array<double, Bivector<double>::size> numbers;
+    for (double& x : numbers) x = 0.35 * normal(engine);
+    const auto b = Bivector<double>::from(numbers);
+    const auto m = exp(b);
+    const auto root = sqrt(m);
+    worst = std::max({worst, difference(exp(log(m)), m), difference(gp(root, root), m),
+                      difference(cayley_inverse(cayley(b)), b)});
+  }
+  std::printf("%.1e", worst);
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("signature", "null_pairs"),
+    [((2, 2, 0), 0), ((2, 2, 0), 1), ((3, 2, 0), 0), ((3, 1, 1), 0), ((2, 1, 2), 0)],
+)
+def test_rotations_and_boosts_are_undone_in_every_signature(
+    tmp_path: Path, signature: tuple[int, int, int], null_pairs: int
+) -> None:
+    products = ("gp", "exp", "log", "sqrt", "cayley", "cayley_inverse")
+    library(tmp_path / "foo", signature, null_pairs, products)
+    source = tmp_path / "trips.cpp"
+    source.write_text(ROUND_TRIPS, encoding="utf-8")
+    include = tmp_path / "foo" / "include"
+    run("g++", "-std=c++20", "-O1", *WARNINGS, "-I", include, source, "-o", tmp_path / "trips")
+    assert float(run(tmp_path / "trips")) < 1e-11
+
+
 def test_the_same_text_changes_nothing_the_second_time(tmp_path: Path) -> None:
     library(tmp_path)
     text = starter_spec("foo", (2, 0, 0), 0, SMALL)

@@ -299,7 +299,8 @@ def log_kernel(
     if any(rho.keys() - {0}) or any(grade(b) not in (0, 4) for b in square):
         raise UsageError(f"{where}: closed forms exist for at most {MAXIMUM_DIMENSION} dimensions")
     negated = {b: poly.scaled(p, -1) for b, p in square.items()}
-    planes = _on_planes(algebra, writer, negated, quad)
+    turning = all(x > 0 for x in negated.get(0, {}).values())  # no boosts
+    planes = _on_planes(algebra, writer, negated, quad) if turning else None
     if planes:
         out = _log_on_planes(algebra, writer, value, planes)
     else:
@@ -992,8 +993,9 @@ def _norm_squared(
     cosine = writer.let("cosine", Sum(polynomial_expression(value[0]), side))
     beyond = Quotient(negative(isoclinic.square), Sum(ONE, negative(cosine)))
     near = Select(cosine, Sum(ONE, cosine), beyond)
-    # both have one sign, but for rounding
-    apart = Call("abs", (Product(near, Sum(n, negative(side))),))
+    apart: Expression = Product(near, Sum(n, negative(side)))
+    if not divided or min(algebra.signature[:2]) < 2:  # both have one sign, but for rounding
+        apart = Call("abs", (apart,))
     return Select(isoclinic.applies, apart, MultiplyAdd(n, n, negative(omega)))
 
 

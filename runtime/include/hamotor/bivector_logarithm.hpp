@@ -77,8 +77,8 @@ template <class S>
   const S half(0.5);
   const S f_plus = angle_over_sine(plus, c + q);
   const S f_minus = angle_over_sine(minus, c - q);
-  // separated in the eigenvalues of C
-  if (abs(q) > S(0.25) * abs(square)) {
+  // separated in the eigenvalues of C, as a rotation's and a boost's always are
+  if (abs(q) > S(0.25) * abs(square) || (plus < S(0)) != (minus < S(0))) {
     return {half * (f_plus + f_minus), half * (f_plus - f_minus) / q};
   }
   // one plane dominates: a and b are separated, a + b and a − b are near each other
