@@ -19,14 +19,12 @@ from hamotor.codegen.library import library
 from hamotor.codegen.spec import AlgebraSpec, bundled_path, parse_algebra, read_algebra
 from hamotor.codegen.starter import starter_spec
 
-CLOSED_FORMS = ("inverse", "sqrt", "exp", "log", "cayley", "cayley_inverse", "normalize")
+CLOSED_FORMS = ("inverse", "sqrt", "cayley", "cayley_inverse", "normalize")
 SIGNATURES = ((1, 0, 1), (1, 0, 3), (2, 2, 0), (2, 1, 2), (3, 1, 1))
-SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()} | {
-    (name := "r" + "".join(map(str, s))): parse_algebra(
-        starter_spec(name, s, products=CLOSED_FORMS), f"{name}.toml"
-    )
-    for s in SIGNATURES
-}
+SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()}
+for p, q, r in SIGNATURES:
+    text = starter_spec(f"r{p}{q}{r}", (p, q, r), products=CLOSED_FORMS)
+    SPECS[f"r{p}{q}{r}"] = parse_algebra(text, "starter.toml")
 KERNELS = {name: library(spec) for name, spec in SPECS.items()}
 Value = dict[Blade, Any]
 

@@ -105,7 +105,9 @@ double difference(const T& a, const T& b) {
   double most = 0.0;
   double size = 0.0;
   for (std::size_t i = 0; i < T::size; ++i) {
-    most = std::max(most, std::fabs(a.components()[i] - b.components()[i]));
+    const double apart = std::fabs(a.components()[i] - b.components()[i]);
+    if (!(apart < 1e300)) return 1e300;  // nor is NaN near anything
+    most = std::max(most, apart);
     size = std::max(size, std::fabs(b.components()[i]));
   }
   return most <= size ? most / size : 1e300;

@@ -83,8 +83,10 @@ QUICK: Final = Extent(
     3, 2.0, 0.01, 0.02, False, COMPILERS[:1],
     methods=("rkmk4", "rk87", "splitting4", "splitting8", "gauss8", "closed_form", "taylor"),
 )  # fmt: skip
-_TYPICAL_S: Final = {"whole": 230.0, "part": 150.0, "quick": 35.0}
-"""What a problem takes on two cores of 3 GHz with public solvers, without long runs."""
+_TYPICAL_S: Final = {"whole": 100.0, "part": 40.0, "quick": 35.0}
+"""What a problem takes on two cores of 3 GHz, without public solvers and long runs."""
+_PEERS_S: Final = 120.0
+"""What public solvers add to that of a problem, if not quick."""
 _LONG_RUNS: Final = 12.0
 """How many times as long as one of a problem's long runs may take all of them take."""
 
@@ -180,7 +182,7 @@ def measure(
         part = _read(_file_of(one, out), _key(one, extents[one.name], about))
         if part is not None:
             kept[one.name] = part
-    left = Left([_typical_s(extents[p.name]) for p in problems if p.name not in kept])
+    left = Left([_typical_s(extents[p.name], peers) for p in problems if p.name not in kept])
     parts: dict[str, Mapping[str, Any]] = {}
     for index, one in enumerate(problems):
         own = extents[one.name]
@@ -236,9 +238,10 @@ def _file_of(one: Problem, out: Path | None) -> Path | None:
     return None if out is None else out / f"precision_{one.name}.json"
 
 
-def _typical_s(extent: Extent) -> float:
+def _typical_s(extent: Extent, peers: Mapping[str, str]) -> float:
     kind = "whole" if extent.forms else "quick" if extent.methods else "part"
-    return _TYPICAL_S[kind] + _LONG_RUNS * extent.longest_run_s * bool(extent.drift)
+    solvers_s = _PEERS_S if peers and kind != "quick" else 0.0
+    return _TYPICAL_S[kind] + solvers_s + _LONG_RUNS * extent.longest_run_s * bool(extent.drift)
 
 
 class Left:

@@ -252,8 +252,10 @@ def _operations_of_calls(program: Program) -> int:
 def _packed_body(kernel: Kernel) -> list[str]:
     """What a kernel of many operations does first, where the scalar and the processor allow it."""
     cost = kernel.program.cost
+    if cost.calls or cost.total < PACKED_OPERATIONS:
+        return []
     packed = lanes.packed_lines(kernel.program, whole=cost.total <= INLINED_OPERATIONS)
-    if packed is None or cost.calls or cost.total < PACKED_OPERATIONS:
+    if packed is None:
         return []
     return [
         PACKED,

@@ -99,9 +99,9 @@ template <int a, int b, int c, int d, class S>
   if constexpr (a > 0 && b > 0 && c > 0 && d > 0) {
     return {moved};
   } else {
+    constexpr typename Four<S>::Lanes signs{sign(a), sign(b), sign(c), sign(d)};
 #if __has_builtin(__builtin_ia32_xorpd256)
     // g++ takes the integers' instruction otherwise, whose result floating point waits for.
-    constexpr typename Four<S>::Lanes signs{sign(a), sign(b), sign(c), sign(d)};
     if constexpr (std::is_same_v<S, double>) {
       return {__builtin_ia32_xorpd256(moved, signs)};
     } else {
@@ -110,7 +110,6 @@ template <int a, int b, int c, int d, class S>
 #else
     using Bits [[gnu::vector_size(4 * sizeof(S))]] =
         std::conditional_t<std::is_same_v<S, double>, std::int64_t, std::int32_t>;
-    constexpr typename Four<S>::Lanes signs{sign(a), sign(b), sign(c), sign(d)};
     return {reinterpret_cast<typename Four<S>::Lanes>(reinterpret_cast<Bits>(moved) ^
                                                       reinterpret_cast<Bits>(signs))};
 #endif
