@@ -91,6 +91,27 @@ def test_the_test_of_few_kernels_compiles_without_warnings(tmp_path: Path) -> No
         run("g++", "-std=c++20", "-fsyntax-only", *WARNINGS, "-I", include, source)
 
 
+def built_test(folder: Path) -> str:
+    """What the generated test says."""
+    include, source = folder / "include", folder / "test" / "foo_test.cpp"
+    run("g++", "-std=c++20", *WARNINGS, "-I", include, source, "-o", folder / "foo_test")
+    return run(folder / "foo_test")
+
+
+@pytest.mark.slow
+def test_chains_are_compared_on_all_tuples(tmp_path: Path) -> None:
+    chains = ("outer Vector Vector Vector", "regressive Bivector Bivector Bivector -> Scalar")
+    library(tmp_path, (3, 0, 0), products=chains)
+    products = 5**2 * 4 + 4**3 + 4**3  # of the group's element, of the chains
+    assert f"foo: {products} comparisons, 0 failures" in built_test(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_library_without_products_passes_its_test(tmp_path: Path) -> None:
+    library(tmp_path, (1, 0, 0), products=("reverse", "norm"))
+    assert "foo: 0 comparisons, 0 failures" in built_test(tmp_path)
+
+
 ROUND_TRIPS = """
 #include <algorithm>
 #include <cmath>

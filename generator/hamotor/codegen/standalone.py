@@ -59,32 +59,29 @@ def _element(element: Element) -> dict[str, Any]:
 
 
 def _kernel(kernel: Kernel) -> dict[str, Any]:
-    left, right = kernel.operands
     result = kernel.program.result
     assert result is not None
     return {
         "name": kernel.name,
         "product": "geometric" if kernel.name == "gp" else kernel.name,
         "title": kernel_title(kernel),
-        "odd": any(g % 2 for g in left.grades),
-        "left": left.name,
-        "right": right.name,
-        "left_variable": _variable(left),
-        "right_variable": _variable(right),
-        "left_size": len(left.components),
-        "right_size": len(right.components),
+        "odd": any(g % 2 for g in kernel.operands[0].grades),
+        "operands": [
+            {"type": e.name, "variable": _variable(e), "size": len(e.components)}
+            for e in kernel.operands
+        ],
         "result": _variable(result),
     }
 
 
 def _test(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
     shared = [k for k in kernels if not k.namespace]
-    bilinear = [_kernel(k) for k in shared if k.name in LAWS and _is_storable(k)]
+    bilinear = [_kernel(k) for k in shared if k.name in LAWS]
     sandwiches = [_kernel(k) for k in shared if k.name.startswith("sandwich")]
     used = {
         name
         for k in bilinear + sandwiches
-        for name in (k["left_variable"], k["right_variable"], k["result"])
+        for name in (*(operand["variable"] for operand in k["operands"]), k["result"])
     }
     gram = ", ".join(
         "{" + ", ".join(repr(float(x)) for x in row) + "}" for row in spec.algebra.gram
@@ -101,8 +98,3 @@ def _test(spec: AlgebraSpec, kernels: Sequence[Kernel]) -> str:
         bilinear=bilinear,
         sandwiches=sandwiches,
     )
-
-
-def _is_storable(kernel: Kernel) -> bool:
-    """Whether both operands are types of their own (a plain number is not)."""
-    return all(e.name != "Scalar" for e in kernel.operands)
