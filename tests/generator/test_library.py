@@ -169,6 +169,57 @@ def test_rotations_and_boosts_are_undone_in_every_signature(
     assert float(run(tmp_path / "trips")) < 1e-11
 
 
+ISOCLINIC = """
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include "hamotor/foo/foo.hpp"
+
+using namespace hamotor::foo;
+
+int main() {
+  double worst = 0.0;
+  for (const double x : {0.1, 0.5, 1.0, 2.0, 3.0, 4.0}) {
+    for (const double other : {1.0, 1.0 + 1e-8, 1.0001, 0.3, 0.01}) {
+      for (const double turn : {0.0, 1e-30, 1e-9}) {
+        for (const double sign : {1.0, -1.0}) {
+          Bivector<double> b{};
+          b.e13 = x;
+          b.e24 = sign * other * x;
+          b.e12 = turn;
+          b.e34 = -turn;
+          const auto found = log(exp(b)).components();
+          for (std::size_t i = 0; i < found.size(); ++i) {
+            const double apart = std::fabs(found[i] - b.components()[i]);
+            if (!(apart <= worst * std::cosh(2 * x))) worst = apart / std::cosh(2 * x);
+            if (std::isnan(apart)) return 1;
+          }
+        }
+      }
+    }
+  }
+  std::printf("%.1e", worst);
+}
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("signature", [(2, 2, 0), (3, 2, 0), (2, 2, 1)])
+def test_log_of_two_boosts_that_are_nearly_equal(
+    tmp_path: Path, signature: tuple[int, int, int]
+) -> None:
+    library(tmp_path / "foo", signature, products=("exp", "log"))
+    source = tmp_path / "isoclinic.cpp"
+    names = {(3, 2, 0): ("e14", "e25", "e12", "e45")}.get(signature, ("e13", "e24", "e12", "e34"))
+    text = ISOCLINIC
+    for old, new in zip(("e13", "e24", "e12", "e34"), names, strict=True):
+        text = text.replace(f"b.{old}", f"b.{new}")
+    source.write_text(text, encoding="utf-8")
+    include = tmp_path / "foo" / "include"
+    run("g++", "-std=c++20", "-O1", *WARNINGS, "-I", include, source, "-o", tmp_path / "isoclinic")
+    assert float(run(tmp_path / "isoclinic")) < 1e-14
+
+
 def test_the_same_text_changes_nothing_the_second_time(tmp_path: Path) -> None:
     library(tmp_path)
     text = starter_spec("foo", (2, 0, 0), 0, SMALL)

@@ -77,12 +77,14 @@ template <class S>
   const S half(0.5);
   const S f_plus = angle_over_sine(plus, c + q);
   const S f_minus = angle_over_sine(minus, c - q);
-  // separated in the eigenvalues of C, as a rotation's and a boost's always are
-  if (abs(q) > S(0.25) * abs(square) || (plus < S(0)) != (minus < S(0))) {
+  const bool boost = plus + minus < S(0);
+  // separated in the eigenvalues of C, as a rotation's and a boost's always are; of two boosts C
+  // grows as c does, and `square` as c²
+  const S size = boost ? S(square / max_abs(c, S(1))) : square;
+  if (abs(q) > S(0.25) * abs(size) || (plus < S(0)) != (minus < S(0))) {
     return {half * (f_plus + f_minus), half * (f_plus - f_minus) / q};
   }
   // one plane dominates: a and b are separated, a + b and a − b are near each other
-  const bool boost = plus + minus < S(0);
   const S sum = boost ? S(asinh(sqrt(abs(plus)))) : S(atan2(sqrt(abs(plus)), c + q));
   const S difference = boost ? S(asinh(sqrt(abs(minus)))) : S(atan2(sqrt(abs(minus)), c - q));
   const S a = half * (sum + difference);
