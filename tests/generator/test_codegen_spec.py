@@ -137,6 +137,13 @@ def test_the_examples_are_right_before_they_are_broken() -> None:
         ('doc = "A vector."', "", 'element.Vector: "doc" must be a text; it is missing'),
         ("[element.Vector]", "[element.3d]", "element.3d: must match"),
         ('blades = ["s"]', 'blades = ["e1"]', "element.Scalar: is the type of numbers"),
+        (
+            'blades = ["s"]',
+            "blades = []\nfixed = { s = 1 }",
+            "element.Scalar: is the type of numbers",
+        ),
+        ('blades = ["s"]', 'blades = ["s"]\nunit = true', "element.Scalar: is the type of numbers"),
+        ('["Vector Vector"]', '["Scalar Vector"]', "Scalar is a number, which functions return"),
         ("outer =", "outr =", 'kernels: unknown operation "outr".*Did you mean "outer"'),
         ('["Vector Vector"]', '["Vector"]', 'kernels.outer: "Vector" must be 2 element name'),
         ('["Vector Vector"]', '["Vector Vector ->"]', "kernels.outer: .* must be 2 element name"),

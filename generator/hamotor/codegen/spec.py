@@ -422,8 +422,12 @@ class _Reader:
             symbol = self.name(table, "symbol", where, reserved.small)
             doc = self.text(table, "doc", where)
             elements[name] = Element(name, symbol, tuple(components), fixed, unit, doc)
-        if "Scalar" in elements and elements["Scalar"].blades != (0,):
-            raise self.fail("element.Scalar", 'is the type of numbers; its blades must be ["s"]')
+        scalar = elements.get("Scalar")
+        if scalar and (scalar.blades != (0,) or scalar.fixed or scalar.unit):
+            raise self.fail(
+                "element.Scalar",
+                'is the type of numbers; its blades must be ["s"], without "fixed" and "unit"',
+            )
         return elements
 
     def groups(
@@ -572,6 +576,12 @@ class _Reader:
                             f'"{text}": unknown element "{word}"; elements are '
                             f"{', '.join(elements)}." + suggest(word, elements),
                         )
+                if "Scalar" in words:
+                    raise self.fail(
+                        where,
+                        f'"{text}": Scalar is a number, which functions return and do not take; '
+                        'declare another element with blades = ["s"] for that',
+                    )
                 request = Request(operation, tuple(words), right.strip() or None, grade)
                 if request in requests:
                     raise self.fail(where, f'"{text}" is listed twice')
