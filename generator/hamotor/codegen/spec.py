@@ -22,6 +22,8 @@ from hamotor.errors import UsageError, suggest
 BUNDLED = Path(__file__).resolve().parents[2] / "algebras"
 MAXIMUM_DIMENSION = 8
 MAXIMUM_BYTES = 1 << 20
+MAXIMUM_DIGITS = 60
+LARGE_EXPONENT = re.compile(r"[eE][-+]?\d{3}")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 INHERITED = ("basis", "gram", "lengths")
 KEYS = ("name", "description", "extends", *INHERITED, "element", "kernels", "group")
@@ -183,8 +185,12 @@ def parse_algebra(text: str, file: str) -> AlgebraSpec:
     """
     try:
         data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise UsageError(f"{file}: not valid TOML: {error}") from error
+    except RecursionError:
+        raise UsageError(f"{file}: not valid TOML: brackets are nested too deeply") from None
+    except ValueError as error:
+        decoded = isinstance(error, tomllib.TOMLDecodeError)
+        problem = error if decoded else "a number of thousands of digits"
+        raise UsageError(f"{file}: not valid TOML: {problem}") from error
     reader = _Reader(file)
     reader.known_keys(data, KEYS, "")
     base = ""
@@ -290,6 +296,16 @@ class _Reader:
         if isinstance(value, bool) or not isinstance(value, int | str):
             raise self.fail(
                 where, f'{value!r} must be an integer or a fraction in a text, like "-1/2"'
+            )
+        large = (
+            len(value) > MAXIMUM_DIGITS or LARGE_EXPONENT.search(value)
+            if isinstance(value, str)
+            else abs(value) >= 10**MAXIMUM_DIGITS
+        )
+        if large:
+            raise self.fail(
+                where,
+                f"a number of more than {MAXIMUM_DIGITS} digits, or its exponent of more than 2",
             )
         try:
             return simplest(Fraction(value))
