@@ -70,6 +70,23 @@ generators = [
 ]
 """
 
+INCOMPLETE = """
+[element.Half]
+doc = "Half a turn."
+symbol = "h"
+blades = ["e12"]
+unit = true
+[element.Weighted]
+doc = "A rotor of another size."
+symbol = "h"
+blades = ["e12"]
+fixed = { s = 1 }
+[element.Wide]
+doc = "An area and a vector."
+symbol = "w"
+blades = ["e12", "e1"]
+"""
+
 
 def replaced(text: str, old: str, new: str) -> str:
     assert text.count(old) >= 1
@@ -230,14 +247,35 @@ def test_a_wrong_group_is_named(old: str, new: str, message: str) -> None:
         ('exp = ["Bivector"]', 'name the result, as in "exp Bivector -> Motor"'),
         ('exp = ["Vector -> Rotor"]', "Vector is not a bivector"),
         ('grade = ["Rotor 2 3"]', "must be 1 element name"),
+        ('log = ["Rotor -> Weighted"]', "Weighted promises more than log keeps: a fixed part"),
+        (
+            'log = ["Weighted -> Bivector"]',
+            "Weighted has a fixed part; name a type that stores all",
+        ),
+        ('log = ["Half -> Bivector"]', "Half has no scalar part, which log needs"),
+        ('log_lean = ["Half -> Bivector"]', "Half has no scalar part, which log needs"),
+        ('cayley_inverse = ["Half -> Bivector"]', "Half has no scalar part, which cayley_inverse"),
+        ('sqrt = ["Half"]', "Half has no scalar part, which sqrt needs"),
+        ('normalize = ["Half"]', None),
+        ('log_lean = ["Rotor -> Wide"]', None),
+        ('log_lean = ["Rotor -> Vector"]', "Vector does not hold the result's part along e12"),
     ],
 )
 def test_a_request_that_cannot_be_met_is_named(request_line: str, message: str | None) -> None:
     text = replaced(GOOD, 'gp = ["Rotor Rotor -> Rotor"]\nouter = ["Vector Vector"]', request_line)
+    text = replaced(text, "[kernels]", f"{INCOMPLETE}[kernels]")
     if message is None:
         assert len(library(parse_algebra(text, "plane.toml"))) > 0
         return
     with pytest.raises(UsageError, match=rf"^plane\.toml: .*{message}"):
+        library(parse_algebra(text, "plane.toml"))
+
+
+@pytest.mark.parametrize("operation", ["exp", "cayley"])
+def test_a_bivector_with_a_number_in_it_is_none_also_where_it_is_null(operation: str) -> None:
+    text = replaced(GOOD, "diagonal = [1, 1]", "diagonal = [0, 1]")
+    text = replaced(text, 'gp = ["Rotor Rotor -> Rotor"]', f'{operation} = ["Rotor -> Rotor"]')
+    with pytest.raises(UsageError, match="Rotor is not a bivector"):
         library(parse_algebra(text, "plane.toml"))
 
 

@@ -596,7 +596,7 @@ def _one_plus_versor(
 
 def _versor(parameter: Parameter, where: str) -> PolynomialMultivector:
     value = value_of(parameter)
-    if any(g % 2 for g in parameter.element.grades) or max(parameter.element.grades) > 4:
+    if not value or any(g not in (0, 2, 4) for g in parameter.element.grades):
         raise UsageError(f"{where}: {parameter.element.name} must be even, with grades 0 to 4")
     return value
 

@@ -207,10 +207,14 @@ def _log_program(
     else:
         for blade in plane.translation:
             out[blade] = Product(scaled, m[blade])
+    if not result.namespace and (lost := sorted(out.keys() - set(result.blades))):
+        names = ", ".join(algebra.blade_name(blade) for blade in lost)
+        raise UsageError(f"{where}: {result.name} does not hold the result's part along {names}")
     outputs: list[tuple[str, Expression]] = []
     for component, functional in zip(result.components, result.reading, strict=True):
         ((blade, x),) = functional.items()
-        outputs.append((component.name, out[blade] if x > 0 else opposite(out[blade])))
+        value = out.get(blade, ZERO)
+        outputs.append((component.name, value if x > 0 else opposite(value)))
     return Program((parameter,), tuple(writer.bindings), tuple(outputs), result)
 
 

@@ -396,15 +396,17 @@ def _unary_kernel(
             return Kernel("norm", "√|<a ~a>₀|", program, None)
         case "inverse":
             return closedform.inverse_kernel(algebra, operand, result or operand, where)
-        case "sqrt":
+        case "sqrt" as operation:
             if not operand.unit:
                 raise UsageError(f"{where}: {operand.name} must be a unit versor (unit = true)")
+            _check_stored(algebra, operation, operand, where)
             return closedform.sqrt_kernel(algebra, operand, result or operand, where)
         case "norm_squared":
             target = result or spec.element("Scalar", where)
             return quadratic_kernel(algebra, "norm_squared", "<a ~a>₀", operand, target)
-        case "normalize":
-            if _simple(algebra, operand):
+        case "normalize" as operation:
+            _check_stored(algebra, operation, operand, where)
+            if _simple(algebra, operand) and 0 in operand.blades:
                 return transcendental.normalize_kernel(algebra, operand, result or operand, where)
             return closedform.normalize_kernel(algebra, operand, result or operand, where)
         case operation:
@@ -412,7 +414,7 @@ def _unary_kernel(
                 result = result or operand
             if result is None:
                 raise UsageError(f'{where}: name the result, as in "{request} -> Motor"')
-            build_form = _closed_form(algebra, operation, operand)
+            build_form = _closed_form(algebra, operation, operand, where)
             return build_form(algebra, operand, result, "", where)
 
 
@@ -506,7 +508,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
     ]
     operations += [(f"{f}_lean", a, b) for f, a, b in operations if f in group.lean]
     for operation, operand, result in operations:
-        build = _closed_form(algebra, operation, operand)
+        build = _closed_form(algebra, operation, operand, where)
         kernels.append(build(algebra, operand, result, namespace, where))
     return kernels
 
@@ -540,7 +542,20 @@ def _simple(algebra: Algebra, operand: Element) -> bool:
     return 0 not in operand.blades or not plane.pitch or set(plane.along) == {*plane.translation}
 
 
-def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedForm:
+def _check_stored(algebra: Algebra, operation: str, operand: Element, where: str) -> None:
+    """Refuse an operand of a closed form that does not store what the form reads."""
+    function = operation.removesuffix("_lean")
+    if function in ("log", "cayley_inverse", "sqrt") and 0 not in operand.blades:
+        raise UsageError(f"{where}: {operand.name} has no scalar part, which {function} needs")
+    translation = nullform.applies(algebra, operand) and function in nullform.BACKWARD
+    if operand.fixed and not (translation and operation == function):
+        raise UsageError(
+            f"{where}: {operand.name} has a fixed part; name a type that stores all its blades"
+        )
+
+
+def _closed_form(algebra: Algebra, operation: str, operand: Element, where: str) -> ClosedForm:
+    _check_stored(algebra, operation, operand, where)
     if operation in lean.LEAN:
         return lean.LEAN[operation]
     simple: dict[str, ClosedForm] = {
@@ -555,7 +570,8 @@ def _closed_form(algebra: Algebra, operation: str, operand: Element) -> ClosedFo
         "cayley": closedform.cayley_kernel,
         "cayley_inverse": closedform.cayley_inverse_kernel,
     }
-    if nullform.applies(algebra, operand):
+    forward = operation in nullform.FORWARD
+    if nullform.applies(algebra, operand) and not (forward and 0 in operand.blades):
         return lambda _algebra, operand, result, namespace, _where: nullform.null_kernel(
             operation, operand, result, namespace
         )
