@@ -241,6 +241,29 @@ def test_a_symbol_that_is_a_step_of_its_kernel_is_refused() -> None:
         library(parse_algebra(with_types([("Type", "root")]), "toy.toml"))
 
 
+@pytest.mark.parametrize("symbol", ["squares", "half_turn", "four", "turned", "four_r_s", "sum12"])
+def test_a_symbol_that_a_groups_function_or_lanes_use_is_refused(symbol: str) -> None:
+    text = with_groups([("Spin", "w")]).replace('symbol = "r"', f'symbol = "{symbol}"')
+    with pytest.raises(UsageError, match=rf'element\.Rotor: "symbol" = "{symbol}" is a step'):
+        library(parse_algebra(text, "toy.toml"))
+
+
+def test_another_symbol_is_named_that_is_no_step() -> None:
+    named = with_types([("Type", "f")]).replace("[1, 1]", "[1, -1]")
+    with pytest.raises(UsageError, match=r'"f" is a step of log already.  Call it "[a-dg-z]"'):
+        library(parse_algebra(named, "toy.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("symbol", ["w", "x", "mu", "a", "b"])
+def test_a_groups_functions_compile_with_the_symbols_of_each_other(
+    tmp_path: Path, symbol: str
+) -> None:
+    text = with_groups([("Spin", "w")]).replace('symbol = "r"', f'symbol = "{symbol}"')
+    text = text.replace('"dexp_inverse"', '"dexp_inverse", "kinematics_onto"')
+    assert compiled(tmp_path, parse_algebra(text, "toy.toml")) == ""
+
+
 @pytest.mark.parametrize(
     ("request_", "message"),
     [

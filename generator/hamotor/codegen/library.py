@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from math import prod
+from string import ascii_lowercase
 
 from hamotor.codegen import closedform, jacobian, lean, nullform, transcendental
 from hamotor.codegen.algebra import (
@@ -48,6 +50,8 @@ from hamotor.codegen.unit import unit_kernels
 from hamotor.errors import UsageError
 
 MAXIMUM_TERMS = 200_000
+PACKED_STEP = re.compile(r"four(_\w+)?|turned|lanes|result|sum\d+")
+"""What kernels name, or call, where they take four numbers at a time."""
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
 """Builds a kernel of an operand, a result, a namespace and what begins an error message."""
 
@@ -87,12 +91,12 @@ def bilinear(algebra: Algebra, operation: str) -> Callable[[Blade, Blade], Multi
 def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
     """Every kernel of a spec, in the order of its requests and then of its groups."""
     kernels = [k for request in stepping_requests(spec) for k in request_kernels(spec, request)]
-    for kernel in kernels:
-        _check_symbols(spec, kernel)
     for element in {group.element.name: group.element for group in spec.groups}.values():
         kernels += unit_kernels(spec.algebra, element)
     for group in spec.groups:
         kernels += group_kernels(spec, group)
+    for kernel in kernels:
+        _check_symbols(spec, kernel)
     return tuple(replace(kernel, program=kernel.program.without_unused()) for kernel in kernels)
 
 
@@ -112,10 +116,13 @@ def _check_symbols(spec: AlgebraSpec, kernel: Kernel) -> None:
     if kernel.shortcut is not None:
         steps |= {"usual", "shortly", *(name for name, _ in kernel.shortcut.where.bindings)}
     for parameter in kernel.program.parameters:
-        if parameter.name in steps:
+        if parameter.name in steps or PACKED_STEP.fullmatch(parameter.name):
+            other = next(
+                c for c in parameter.name + ascii_lowercase if c.isalpha() and c not in steps
+            )
             raise UsageError(
                 f'{spec.file}: element.{parameter.element.name}: "symbol" = "{parameter.name}" is '
-                f'a step of {kernel.name} already.  Call it "{parameter.name[0]}", for example'
+                f'a step of {kernel.name} already.  Call it "{other}", for example'
             )
 
 
@@ -515,7 +522,7 @@ def group_kernels(spec: AlgebraSpec, group: LieGroup) -> list[Kernel]:
 
 def _kinematics_onto(algebra: Algebra, group: LieGroup) -> Kernel:
     """x + 2 m w, twice because generators are halves of blades: terms then have no factor."""
-    m, w = (Parameter(e.symbol, e) for e in (group.element, group.rate))
+    m, w = parameters_for(group.element, group.rate)
     start = Parameter("start" if "x" in {m.name, w.name} else "x", group.element)
     twice = apply_bilinear(algebra.geometric, value_of(m), value_of(w))
     gained = {n: scaled(p, 2) for n, p in read_off(twice, group.element).items()}
