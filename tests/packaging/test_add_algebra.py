@@ -112,6 +112,17 @@ def test_a_changed_spec_is_generated_again(tmp_path: Path) -> None:
     assert run(build / "app") == "-3\n"
 
 
+def test_a_spec_is_known_by_its_name_however_toml_writes_it(tmp_path: Path) -> None:
+    include = f'include("{ROOT / "cmake" / "HamotorAddAlgebra.cmake"}")'
+    project(tmp_path, "hamotor_add_algebra(line SPEC line.toml)", include)
+    group = '[[group]]\nname = "Turn"\n'
+    for name in ("name = 'line'", '  name="line"  # two vectors', '\tname\t= "line"'):
+        text = SPEC.replace('name = "line"', name) + group
+        (tmp_path / "line.toml").write_text(text, encoding="utf-8")
+        configured = configure(tmp_path)
+        assert configured.returncode == 0, configured.stdout
+
+
 def test_an_installed_hamotor_calls_the_generator_it_is_given(tmp_path: Path) -> None:
     prefix, own = tmp_path / "prefix", tmp_path / "own"
     run("cmake", "-G", "Ninja", "-DHAMOTOR_BUILD_TESTS=OFF", "-S", ROOT, "-B", own)
