@@ -100,9 +100,13 @@ def built_test(folder: Path) -> str:
 
 @pytest.mark.slow
 def test_chains_are_compared_on_all_tuples(tmp_path: Path) -> None:
-    chains = ("outer Vector Vector Vector", "regressive Bivector Bivector Bivector -> Scalar")
+    chains = (
+        "outer Vector Vector Vector",
+        "regressive Bivector Bivector Bivector -> Scalar",
+        "gp Even Even Even",
+    )
     library(tmp_path, (3, 0, 0), products=chains)
-    products = 5**2 * 4 + 4**3 + 4**3  # of the group's element, of the chains
+    products = 5**2 * 4 + 4**3 + 4**3 + 5**3 * 4  # of the group's element, of the chains
     assert f"foo: {products} comparisons, 0 failures" in built_test(tmp_path)
 
 

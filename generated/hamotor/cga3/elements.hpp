@@ -1011,14 +1011,14 @@ struct SimilarityDefect {
   using Scalar = S;
   S s;
   S e012i;
-  S e013i;
+  S e031i;
   S e023i;
   S e123i;
 
   /// Number of components.
   static constexpr std::size_t size = 5;
   /// Names of the components, in storage order.
-  static constexpr std::array<std::string_view, size> names{"s", "e012i", "e013i", "e023i",
+  static constexpr std::array<std::string_view, size> names{"s", "e012i", "e031i", "e023i",
                                                             "e123i"};
   /// The value with the given components, in storage order.
   [[nodiscard]] static constexpr SimilarityDefect from(const std::array<S, size>& x) noexcept {
@@ -1026,36 +1026,36 @@ struct SimilarityDefect {
   }
   /// The components in storage order.
   [[nodiscard]] constexpr std::array<S, size> components() const noexcept {
-    return {s, e012i, e013i, e023i, e123i};
+    return {s, e012i, e031i, e023i, e123i};
   }
   /// The same value in another scalar type.
   template <class T>
   [[nodiscard]] constexpr SimilarityDefect<T> cast() const {
-    return {static_cast<T>(s), static_cast<T>(e012i), static_cast<T>(e013i), static_cast<T>(e023i),
+    return {static_cast<T>(s), static_cast<T>(e012i), static_cast<T>(e031i), static_cast<T>(e023i),
             static_cast<T>(e123i)};
   }
   [[nodiscard]] friend constexpr bool operator==(const SimilarityDefect&,
                                                  const SimilarityDefect&) = default;
   [[nodiscard]] friend constexpr SimilarityDefect operator+(const SimilarityDefect& a,
                                                             const SimilarityDefect& b) noexcept {
-    return {a.s + b.s, a.e012i + b.e012i, a.e013i + b.e013i, a.e023i + b.e023i, a.e123i + b.e123i};
+    return {a.s + b.s, a.e012i + b.e012i, a.e031i + b.e031i, a.e023i + b.e023i, a.e123i + b.e123i};
   }
   [[nodiscard]] friend constexpr SimilarityDefect operator-(const SimilarityDefect& a,
                                                             const SimilarityDefect& b) noexcept {
-    return {a.s - b.s, a.e012i - b.e012i, a.e013i - b.e013i, a.e023i - b.e023i, a.e123i - b.e123i};
+    return {a.s - b.s, a.e012i - b.e012i, a.e031i - b.e031i, a.e023i - b.e023i, a.e123i - b.e123i};
   }
   [[nodiscard]] friend constexpr SimilarityDefect operator-(const SimilarityDefect& a) noexcept {
-    return {-a.s, -a.e012i, -a.e013i, -a.e023i, -a.e123i};
+    return {-a.s, -a.e012i, -a.e031i, -a.e023i, -a.e123i};
   }
   [[nodiscard]] friend constexpr SimilarityDefect operator*(const S& x,
                                                             const SimilarityDefect& a) noexcept {
-    return {x * a.s, x * a.e012i, x * a.e013i, x * a.e023i, x * a.e123i};
+    return {x * a.s, x * a.e012i, x * a.e031i, x * a.e023i, x * a.e123i};
   }
   /// x a + b, one multiply-add for each component.
   [[nodiscard]] friend constexpr SimilarityDefect mul_add(const S& x, const SimilarityDefect& a,
                                                           const SimilarityDefect& b) noexcept {
     return {hamotor::mul_add(x, a.s, b.s), hamotor::mul_add(x, a.e012i, b.e012i),
-            hamotor::mul_add(x, a.e013i, b.e013i), hamotor::mul_add(x, a.e023i, b.e023i),
+            hamotor::mul_add(x, a.e031i, b.e031i), hamotor::mul_add(x, a.e023i, b.e023i),
             hamotor::mul_add(x, a.e123i, b.e123i)};
   }
 };
@@ -1067,7 +1067,7 @@ struct VersorDefect {
   S s;
   S e0123;
   S e012i;
-  S e013i;
+  S e031i;
   S e023i;
   S e123i;
 
@@ -1075,45 +1075,45 @@ struct VersorDefect {
   static constexpr std::size_t size = 6;
   /// Names of the components, in storage order.
   static constexpr std::array<std::string_view, size> names{"s",     "e0123", "e012i",
-                                                            "e013i", "e023i", "e123i"};
+                                                            "e031i", "e023i", "e123i"};
   /// The value with the given components, in storage order.
   [[nodiscard]] static constexpr VersorDefect from(const std::array<S, size>& x) noexcept {
     return {x[0], x[1], x[2], x[3], x[4], x[5]};
   }
   /// The components in storage order.
   [[nodiscard]] constexpr std::array<S, size> components() const noexcept {
-    return {s, e0123, e012i, e013i, e023i, e123i};
+    return {s, e0123, e012i, e031i, e023i, e123i};
   }
   /// The same value in another scalar type.
   template <class T>
   [[nodiscard]] constexpr VersorDefect<T> cast() const {
     return {static_cast<T>(s),     static_cast<T>(e0123), static_cast<T>(e012i),
-            static_cast<T>(e013i), static_cast<T>(e023i), static_cast<T>(e123i)};
+            static_cast<T>(e031i), static_cast<T>(e023i), static_cast<T>(e123i)};
   }
   [[nodiscard]] friend constexpr bool operator==(const VersorDefect&,
                                                  const VersorDefect&) = default;
   [[nodiscard]] friend constexpr VersorDefect operator+(const VersorDefect& a,
                                                         const VersorDefect& b) noexcept {
     return {a.s + b.s,         a.e0123 + b.e0123, a.e012i + b.e012i,
-            a.e013i + b.e013i, a.e023i + b.e023i, a.e123i + b.e123i};
+            a.e031i + b.e031i, a.e023i + b.e023i, a.e123i + b.e123i};
   }
   [[nodiscard]] friend constexpr VersorDefect operator-(const VersorDefect& a,
                                                         const VersorDefect& b) noexcept {
     return {a.s - b.s,         a.e0123 - b.e0123, a.e012i - b.e012i,
-            a.e013i - b.e013i, a.e023i - b.e023i, a.e123i - b.e123i};
+            a.e031i - b.e031i, a.e023i - b.e023i, a.e123i - b.e123i};
   }
   [[nodiscard]] friend constexpr VersorDefect operator-(const VersorDefect& a) noexcept {
-    return {-a.s, -a.e0123, -a.e012i, -a.e013i, -a.e023i, -a.e123i};
+    return {-a.s, -a.e0123, -a.e012i, -a.e031i, -a.e023i, -a.e123i};
   }
   [[nodiscard]] friend constexpr VersorDefect operator*(const S& x,
                                                         const VersorDefect& a) noexcept {
-    return {x * a.s, x * a.e0123, x * a.e012i, x * a.e013i, x * a.e023i, x * a.e123i};
+    return {x * a.s, x * a.e0123, x * a.e012i, x * a.e031i, x * a.e023i, x * a.e123i};
   }
   /// x a + b, one multiply-add for each component.
   [[nodiscard]] friend constexpr VersorDefect mul_add(const S& x, const VersorDefect& a,
                                                       const VersorDefect& b) noexcept {
     return {hamotor::mul_add(x, a.s, b.s),         hamotor::mul_add(x, a.e0123, b.e0123),
-            hamotor::mul_add(x, a.e012i, b.e012i), hamotor::mul_add(x, a.e013i, b.e013i),
+            hamotor::mul_add(x, a.e012i, b.e012i), hamotor::mul_add(x, a.e031i, b.e031i),
             hamotor::mul_add(x, a.e023i, b.e023i), hamotor::mul_add(x, a.e123i, b.e123i)};
   }
 };

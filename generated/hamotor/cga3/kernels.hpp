@@ -466,188 +466,439 @@ template <class S>
 /// Cost: 72 mul, 64 add (40 fused).  Sparsity: 72 of 80 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Odd<S> gp(const Even<S>& a, const Vector<S>& v) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S a_plus_s = a.s - a.e0i;
+      const auto three_a_e023i = four(a.e023i, a.e031i, a.e012i, a.e023i);
+      const auto three_a_e23 = four(a.e23, a.e31, a.e12, a.e23);
+      const auto three_a_plus_e12 =
+          turned<3, 1, 2, 3>(three_a_e23) - turned<3, 1, 2, 3>(three_a_e023i);
+      const auto three_a_e01 = four(a.e01, a.e02, a.e03, a.e01);
+      const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
+      const auto three_plus_e1 =
+          dot(three_a_e01, four(v.ei), four(S(0.5)),
+              dot(four(a_plus_s), three_v_e1, three_a_plus_e12, turned<2, 3, 4, 2>(three_v_e1),
+                  -turned<3, 1, 2, 3>(three_a_plus_e12), turned<3, 1, 2, 3>(three_v_e1)));
+      const auto three_a_minus_e12 =
+          turned<3, 1, 2, 3>(three_a_e23) + turned<3, 1, 2, 3>(three_a_e023i);
+      const S a_minus_s = a.s + a.e0i;
+      const auto three_a_e1i = four(a.e1i, a.e2i, a.e3i, a.e1i);
+      const auto three_minus_e1 =
+          dot(-three_a_e1i, four(v.e0), four(S(0.5)),
+              dot(four(a_minus_s), three_v_e1, three_a_minus_e12, turned<2, 3, 4, 2>(three_v_e1),
+                  -turned<3, 1, 2, 3>(three_a_minus_e12), turned<3, 1, 2, 3>(three_v_e1)));
+      const S a_plus_e23 = three_a_plus_e12[1];
+      const S a_plus_e31 = three_a_plus_e12[2];
+      const S a_plus_e12 = three_a_plus_e12[0];
+      const S plus_e123 =
+          dot(a.e0123, v.ei, S(0.5), dot(a_plus_e12, v.e3, a_plus_e31, v.e2, a_plus_e23, v.e1));
+      const S a_minus_e23 = three_a_minus_e12[1];
+      const S a_minus_e31 = three_a_minus_e12[2];
+      const S a_minus_e12 = three_a_minus_e12[0];
+      const S minus_e123 =
+          dot(-a.e123i, v.e0, S(0.5), dot(a_minus_e12, v.e3, a_minus_e31, v.e2, a_minus_e23, v.e1));
+      const auto all_e1 = three_plus_e1 + three_minus_e1;
+      const auto all_e023 =
+          dot(turned<2, 3, 4, 2>(three_a_e01), turned<3, 1, 2, 3>(three_v_e1),
+              -turned<3, 1, 2, 3>(three_a_e01), turned<2, 3, 4, 2>(three_v_e1), four(a.e0123),
+              three_v_e1, turned<2, 3, 4, 2>(three_a_plus_e12), four(v.e0));
+      const auto all_e01i = three_plus_e1 - three_minus_e1;
+      const auto all_e23i =
+          dot(-turned<2, 3, 4, 2>(three_a_e1i), turned<3, 1, 2, 3>(three_v_e1),
+              turned<3, 1, 2, 3>(three_a_e1i), turned<2, 3, 4, 2>(three_v_e1), -four(a.e123i),
+              three_v_e1, turned<2, 3, 4, 2>(three_a_minus_e12), four(v.ei));
+      return {.e0 = dot(a.e01, v.e1, a.e02, v.e2, a.e03, v.e3, a_plus_s, v.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = dot(-a.e1i, v.e1, -a.e2i, v.e2, -a.e3i, v.e3, a_minus_s, v.ei),
+              .e023 = all_e023[0],
+              .e031 = all_e023[1],
+              .e012 = all_e023[2],
+              .e123 = plus_e123 + minus_e123,
+              .e01i = all_e01i[0],
+              .e02i = all_e01i[1],
+              .e03i = all_e01i[2],
+              .e23i = all_e23i[0],
+              .e31i = all_e23i[1],
+              .e12i = all_e23i[2],
+              .e0123i = plus_e123 - minus_e123};
+    }
+  }
   const S a_plus_s = a.s - a.e0i;
-  const S a_minus_s = a.s + a.e0i;
   const S a_plus_e12 = a.e12 - a.e012i;
-  const S a_minus_e12 = a.e12 + a.e012i;
-  const S a_plus_e13 = -a.e31 + a.e031i;
-  const S a_minus_e13 = -a.e31 - a.e031i;
   const S a_plus_e23 = a.e23 - a.e023i;
-  const S a_minus_e23 = a.e23 + a.e023i;
+  const S a_plus_e31 = a.e31 - a.e031i;
   const S plus_e1 =
-      dot(a.e01, v.ei, S(0.5), dot(a_plus_s, v.e1, a_plus_e12, v.e2, a_plus_e13, v.e3));
-  const S minus_e1 =
-      dot(-a.e1i, v.e0, S(0.5), dot(a_minus_s, v.e1, a_minus_e12, v.e2, a_minus_e13, v.e3));
+      dot(a.e01, v.ei, S(0.5), dot(a_plus_s, v.e1, a_plus_e12, v.e2, -a_plus_e31, v.e3));
   const S plus_e2 =
-      dot(a.e02, v.ei, S(0.5), dot(a_plus_s, v.e2, -a_plus_e12, v.e1, a_plus_e23, v.e3));
-  const S minus_e2 =
-      dot(-a.e2i, v.e0, S(0.5), dot(a_minus_s, v.e2, -a_minus_e12, v.e1, a_minus_e23, v.e3));
+      dot(a.e02, v.ei, S(0.5), dot(a_plus_s, v.e2, a_plus_e23, v.e3, -a_plus_e12, v.e1));
   const S plus_e3 =
-      dot(a.e03, v.ei, S(0.5), dot(a_plus_s, v.e3, -a_plus_e13, v.e1, -a_plus_e23, v.e2));
+      dot(a.e03, v.ei, S(0.5), dot(a_plus_s, v.e3, a_plus_e31, v.e1, -a_plus_e23, v.e2));
+  const S a_minus_e12 = a.e12 + a.e012i;
+  const S a_minus_e23 = a.e23 + a.e023i;
+  const S a_minus_e31 = a.e31 + a.e031i;
+  const S a_minus_s = a.s + a.e0i;
+  const S minus_e1 =
+      dot(-a.e1i, v.e0, S(0.5), dot(a_minus_s, v.e1, a_minus_e12, v.e2, -a_minus_e31, v.e3));
+  const S minus_e2 =
+      dot(-a.e2i, v.e0, S(0.5), dot(a_minus_s, v.e2, a_minus_e23, v.e3, -a_minus_e12, v.e1));
   const S minus_e3 =
-      dot(-a.e3i, v.e0, S(0.5), dot(a_minus_s, v.e3, -a_minus_e13, v.e1, -a_minus_e23, v.e2));
+      dot(-a.e3i, v.e0, S(0.5), dot(a_minus_s, v.e3, a_minus_e31, v.e1, -a_minus_e23, v.e2));
   const S plus_e123 =
-      dot(a.e0123, v.ei, S(0.5), dot(a_plus_e12, v.e3, -a_plus_e13, v.e2, a_plus_e23, v.e1));
+      dot(a.e0123, v.ei, S(0.5), dot(a_plus_e12, v.e3, a_plus_e31, v.e2, a_plus_e23, v.e1));
   const S minus_e123 =
-      dot(-a.e123i, v.e0, S(0.5), dot(a_minus_e12, v.e3, -a_minus_e13, v.e2, a_minus_e23, v.e1));
+      dot(-a.e123i, v.e0, S(0.5), dot(a_minus_e12, v.e3, a_minus_e31, v.e2, a_minus_e23, v.e1));
   return {.e0 = dot(a.e01, v.e1, a.e02, v.e2, a.e03, v.e3, a_plus_s, v.e0),
           .e1 = plus_e1 + minus_e1,
           .e2 = plus_e2 + minus_e2,
           .e3 = plus_e3 + minus_e3,
           .ei = dot(-a.e1i, v.e1, -a.e2i, v.e2, -a.e3i, v.e3, a_minus_s, v.ei),
           .e023 = dot(a.e02, v.e3, -a.e03, v.e2, a.e0123, v.e1, a_plus_e23, v.e0),
-          .e031 = dot(-a.e01, v.e3, a.e03, v.e1, a.e0123, v.e2, -a_plus_e13, v.e0),
+          .e031 = dot(a.e03, v.e1, -a.e01, v.e3, a.e0123, v.e2, a_plus_e31, v.e0),
           .e012 = dot(a.e01, v.e2, -a.e02, v.e1, a.e0123, v.e3, a_plus_e12, v.e0),
           .e123 = plus_e123 + minus_e123,
           .e01i = plus_e1 - minus_e1,
           .e02i = plus_e2 - minus_e2,
           .e03i = plus_e3 - minus_e3,
           .e23i = dot(-a.e2i, v.e3, a.e3i, v.e2, -a.e123i, v.e1, a_minus_e23, v.ei),
-          .e31i = dot(a.e1i, v.e3, -a.e3i, v.e1, -a.e123i, v.e2, -a_minus_e13, v.ei),
+          .e31i = dot(-a.e3i, v.e1, a.e1i, v.e3, -a.e123i, v.e2, a_minus_e31, v.ei),
           .e12i = dot(-a.e1i, v.e2, a.e2i, v.e1, -a.e123i, v.e3, a_minus_e12, v.ei),
           .e0123i = plus_e123 - minus_e123};
 }
 
 /// gp: Bivector Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 100 mul, 84 add (66 fused).  Sparsity: 82 of 100 pairs of components.
+/// Cost: 100 mul, 84 add (64 fused).  Sparsity: 82 of 100 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Bivector<S>& a, const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_a_e01 = four(a.e01, a.e02, a.e03, a.e01);
+      const auto three_a_e1i = four(a.e1i, a.e2i, a.e3i, a.e1i);
+      const auto three_a_e23 = four(a.e23, a.e31, a.e12, a.e23);
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto all_e23 = dot(-turned<2, 3, 4, 2>(three_a_e23), turned<3, 1, 2, 3>(three_b_e23),
+                               turned<3, 1, 2, 3>(three_a_e23), turned<2, 3, 4, 2>(three_b_e23),
+                               -turned<2, 3, 4, 2>(three_a_e1i), turned<3, 1, 2, 3>(three_b_e01),
+                               turned<3, 1, 2, 3>(three_a_e1i), turned<2, 3, 4, 2>(three_b_e01),
+                               -turned<2, 3, 4, 2>(three_a_e01), turned<3, 1, 2, 3>(three_b_e1i),
+                               turned<3, 1, 2, 3>(three_a_e01), turned<2, 3, 4, 2>(three_b_e1i));
+      const auto all_e1i = dot(-three_a_e1i, four(b.e0i), -turned<2, 3, 4, 2>(three_a_e1i),
+                               turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_a_e1i),
+                               turned<2, 3, 4, 2>(three_b_e23), -turned<2, 3, 4, 2>(three_a_e23),
+                               turned<3, 1, 2, 3>(three_b_e1i), turned<3, 1, 2, 3>(three_a_e23),
+                               turned<2, 3, 4, 2>(three_b_e1i), four(a.e0i), three_b_e1i);
+      const auto all_e023i = dot(three_a_e23, four(b.e0i), four(a.e0i), three_b_e23,
+                                 -turned<2, 3, 4, 2>(three_a_e1i), turned<3, 1, 2, 3>(three_b_e01),
+                                 turned<3, 1, 2, 3>(three_a_e1i), turned<2, 3, 4, 2>(three_b_e01),
+                                 turned<2, 3, 4, 2>(three_a_e01), turned<3, 1, 2, 3>(three_b_e1i),
+                                 -turned<3, 1, 2, 3>(three_a_e01), turned<2, 3, 4, 2>(three_b_e1i));
+      const auto all_e01 = dot(three_a_e01, four(b.e0i), -turned<2, 3, 4, 2>(three_a_e01),
+                               turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_a_e01),
+                               turned<2, 3, 4, 2>(three_b_e23), -turned<2, 3, 4, 2>(three_a_e23),
+                               turned<3, 1, 2, 3>(three_b_e01), turned<3, 1, 2, 3>(three_a_e23),
+                               turned<2, 3, 4, 2>(three_b_e01), -four(a.e0i), three_b_e01);
+      return {.s = mul_add(a.e0i, b.e0i,
+                           lanes::total(dot(-three_a_e23, three_b_e23, -three_a_e1i, three_b_e01,
+                                            -three_a_e01, three_b_e1i))),
+              .e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e123i = lanes::total(dot(three_a_e1i, three_b_e23, three_a_e23, three_b_e1i)),
+              .e0i = lanes::total(dot(-three_a_e1i, three_b_e01, three_a_e01, three_b_e1i)),
+              .e023i = all_e023i[0],
+              .e031i = all_e023i[1],
+              .e012i = all_e023i[2],
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2],
+              .e0123 = lanes::total(dot(three_a_e01, three_b_e23, three_a_e23, three_b_e01))};
+    }
+  }
   return {
-      .s = dot(-a.e23, b.e23, -a.e31, b.e31, -a.e12, b.e12, a.e0i, b.e0i, -a.e1i, b.e01, -a.e2i,
-               b.e02, -a.e3i, b.e03, -a.e01, b.e1i, -a.e02, b.e2i, -a.e03, b.e3i),
+      .s = mul_add(a.e0i, b.e0i,
+                   dot(-a.e23, b.e23, -a.e1i, b.e01, -a.e01, b.e1i) +
+                       dot(-a.e31, b.e31, -a.e2i, b.e02, -a.e02, b.e2i) +
+                       dot(-a.e12, b.e12, -a.e3i, b.e03, -a.e03, b.e3i)),
       .e23 = dot(-a.e31, b.e12, a.e12, b.e31, -a.e2i, b.e03, a.e3i, b.e02, -a.e02, b.e3i, a.e03,
                  b.e2i),
-      .e31 = dot(a.e23, b.e12, -a.e12, b.e23, a.e1i, b.e03, -a.e3i, b.e01, a.e01, b.e3i, -a.e03,
-                 b.e1i),
+      .e31 = dot(-a.e12, b.e23, a.e23, b.e12, -a.e3i, b.e01, a.e1i, b.e03, -a.e03, b.e1i, a.e01,
+                 b.e3i),
       .e12 = dot(-a.e23, b.e31, a.e31, b.e23, -a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02,
                  b.e1i),
       .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, -a.e31, b.e3i, a.e12, b.e2i, a.e0i,
                  b.e1i),
-      .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e23, b.e3i, -a.e12, b.e1i, a.e0i,
+      .e2i = dot(-a.e2i, b.e0i, -a.e3i, b.e23, a.e1i, b.e12, -a.e12, b.e1i, a.e23, b.e3i, a.e0i,
                  b.e2i),
-      .e3i = dot(-a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
+      .e3i = dot(-a.e3i, b.e0i, -a.e1i, b.e31, a.e2i, b.e23, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
                  b.e3i),
-      .e123i =
-          dot(a.e1i, b.e23, a.e2i, b.e31, a.e3i, b.e12, a.e23, b.e1i, a.e31, b.e2i, a.e12, b.e3i),
-      .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e01, b.e1i, a.e02, b.e2i, a.e03,
-                 b.e3i),
+      .e123i = dot(a.e1i, b.e23, a.e23, b.e1i) + dot(a.e2i, b.e31, a.e31, b.e2i) +
+               dot(a.e3i, b.e12, a.e12, b.e3i),
+      .e0i = dot(-a.e1i, b.e01, a.e01, b.e1i) + dot(-a.e2i, b.e02, a.e02, b.e2i) +
+             dot(-a.e3i, b.e03, a.e03, b.e3i),
       .e023i =
           dot(a.e23, b.e0i, a.e0i, b.e23, -a.e2i, b.e03, a.e3i, b.e02, a.e02, b.e3i, -a.e03, b.e2i),
       .e031i =
-          dot(a.e31, b.e0i, a.e0i, b.e31, a.e1i, b.e03, -a.e3i, b.e01, -a.e01, b.e3i, a.e03, b.e1i),
+          dot(a.e31, b.e0i, a.e0i, b.e31, -a.e3i, b.e01, a.e1i, b.e03, a.e03, b.e1i, -a.e01, b.e3i),
       .e012i =
           dot(a.e12, b.e0i, a.e0i, b.e12, -a.e1i, b.e02, a.e2i, b.e01, a.e01, b.e2i, -a.e02, b.e1i),
       .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02, -a.e0i,
                  b.e01),
-      .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01, -a.e0i,
+      .e02 = dot(a.e02, b.e0i, -a.e03, b.e23, a.e01, b.e12, -a.e12, b.e01, a.e23, b.e03, -a.e0i,
                  b.e02),
-      .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.e0i, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
+      .e03 = dot(a.e03, b.e0i, -a.e01, b.e31, a.e02, b.e23, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
                  b.e03),
-      .e0123 =
-          dot(a.e01, b.e23, a.e02, b.e31, a.e03, b.e12, a.e23, b.e01, a.e31, b.e02, a.e12, b.e03)};
+      .e0123 = dot(a.e01, b.e23, a.e23, b.e01) + dot(a.e02, b.e31, a.e31, b.e02) +
+               dot(a.e03, b.e12, a.e12, b.e03)};
 }
 
 /// gp: Bivector Trivector -> Odd
 /// a b, the geometric product.
-/// Cost: 100 mul, 84 add (66 fused).  Sparsity: 82 of 100 pairs of components.
+/// Cost: 100 mul, 84 add (64 fused).  Sparsity: 82 of 100 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Odd<S> gp(const Bivector<S>& b, const Trivector<S>& t) noexcept {
-  return {.e0 = dot(-b.e01, t.e01i, -b.e02, t.e02i, -b.e03, t.e03i, -b.e23, t.e023, -b.e31, t.e031,
-                    -b.e12, t.e012),
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
+      const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
+      const auto all_e1 = dot(-three_b_e23, four(t.e123), -four(b.e0i), three_t_e01i,
+                              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_t_e023),
+                              -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_t_e023),
+                              -turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_t_e23i),
+                              turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_t_e23i));
+      const auto all_e023 = dot(three_b_e01, four(t.e123), -turned<2, 3, 4, 2>(three_b_e01),
+                                turned<3, 1, 2, 3>(three_t_e01i), turned<3, 1, 2, 3>(three_b_e01),
+                                turned<2, 3, 4, 2>(three_t_e01i), -turned<2, 3, 4, 2>(three_b_e23),
+                                turned<3, 1, 2, 3>(three_t_e023), turned<3, 1, 2, 3>(three_b_e23),
+                                turned<2, 3, 4, 2>(three_t_e023), -four(b.e0i), three_t_e023);
+      const auto all_e01i = dot(-turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_t_e01i),
+                                turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_t_e01i),
+                                -turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_t_e023),
+                                turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_t_e023),
+                                -turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_t_e23i),
+                                turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_t_e23i));
+      const auto all_e23i = dot(-three_b_e1i, four(t.e123), -turned<2, 3, 4, 2>(three_b_e1i),
+                                turned<3, 1, 2, 3>(three_t_e01i), turned<3, 1, 2, 3>(three_b_e1i),
+                                turned<2, 3, 4, 2>(three_t_e01i), -turned<2, 3, 4, 2>(three_b_e23),
+                                turned<3, 1, 2, 3>(three_t_e23i), turned<3, 1, 2, 3>(three_b_e23),
+                                turned<2, 3, 4, 2>(three_t_e23i), four(b.e0i), three_t_e23i);
+      return {.e0 = lanes::total(dot(-three_b_e01, three_t_e01i, -three_b_e23, three_t_e023)),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = lanes::total(dot(-three_b_e1i, three_t_e01i, -three_b_e23, three_t_e23i)),
+              .e023 = all_e023[0],
+              .e031 = all_e023[1],
+              .e012 = all_e023[2],
+              .e123 = lanes::total(dot(-three_b_e1i, three_t_e023, three_b_e01, three_t_e23i)),
+              .e01i = all_e01i[0],
+              .e02i = all_e01i[1],
+              .e03i = all_e01i[2],
+              .e23i = all_e23i[0],
+              .e31i = all_e23i[1],
+              .e12i = all_e23i[2],
+              .e0123i = mul_add(-b.e0i, t.e123,
+                                lanes::total(dot(three_b_e23, three_t_e01i, three_b_e1i,
+                                                 three_t_e023, three_b_e01, three_t_e23i)))};
+    }
+  }
+  return {.e0 = dot(-b.e01, t.e01i, -b.e23, t.e023) + dot(-b.e02, t.e02i, -b.e31, t.e031) +
+                dot(-b.e03, t.e03i, -b.e12, t.e012),
           .e1 = dot(-b.e23, t.e123, -b.e0i, t.e01i, b.e2i, t.e012, -b.e3i, t.e031, -b.e02, t.e12i,
                     b.e03, t.e31i),
-          .e2 = dot(-b.e31, t.e123, -b.e0i, t.e02i, -b.e1i, t.e012, b.e3i, t.e023, b.e01, t.e12i,
-                    -b.e03, t.e23i),
+          .e2 = dot(-b.e31, t.e123, -b.e0i, t.e02i, b.e3i, t.e023, -b.e1i, t.e012, -b.e03, t.e23i,
+                    b.e01, t.e12i),
           .e3 = dot(-b.e12, t.e123, -b.e0i, t.e03i, b.e1i, t.e031, -b.e2i, t.e023, -b.e01, t.e31i,
                     b.e02, t.e23i),
-          .ei = dot(-b.e1i, t.e01i, -b.e2i, t.e02i, -b.e3i, t.e03i, -b.e23, t.e23i, -b.e31, t.e31i,
-                    -b.e12, t.e12i),
+          .ei = dot(-b.e1i, t.e01i, -b.e23, t.e23i) + dot(-b.e2i, t.e02i, -b.e31, t.e31i) +
+                dot(-b.e3i, t.e03i, -b.e12, t.e12i),
           .e023 = dot(b.e01, t.e123, -b.e02, t.e03i, b.e03, t.e02i, -b.e31, t.e012, b.e12, t.e031,
                       -b.e0i, t.e023),
-          .e031 = dot(b.e01, t.e03i, b.e02, t.e123, -b.e03, t.e01i, b.e23, t.e012, -b.e12, t.e023,
+          .e031 = dot(b.e02, t.e123, -b.e03, t.e01i, b.e01, t.e03i, -b.e12, t.e023, b.e23, t.e012,
                       -b.e0i, t.e031),
-          .e012 = dot(-b.e01, t.e02i, b.e02, t.e01i, b.e03, t.e123, -b.e23, t.e031, b.e31, t.e023,
+          .e012 = dot(b.e03, t.e123, -b.e01, t.e02i, b.e02, t.e01i, -b.e23, t.e031, b.e31, t.e023,
                       -b.e0i, t.e012),
-          .e123 = dot(-b.e1i, t.e023, -b.e2i, t.e031, -b.e3i, t.e012, b.e01, t.e23i, b.e02, t.e31i,
-                      b.e03, t.e12i),
+          .e123 = dot(-b.e1i, t.e023, b.e01, t.e23i) + dot(-b.e2i, t.e031, b.e02, t.e31i) +
+                  dot(-b.e3i, t.e012, b.e03, t.e12i),
           .e01i = dot(-b.e31, t.e03i, b.e12, t.e02i, -b.e2i, t.e012, b.e3i, t.e031, -b.e02, t.e12i,
                       b.e03, t.e31i),
-          .e02i = dot(b.e23, t.e03i, -b.e12, t.e01i, b.e1i, t.e012, -b.e3i, t.e023, b.e01, t.e12i,
-                      -b.e03, t.e23i),
+          .e02i = dot(-b.e12, t.e01i, b.e23, t.e03i, -b.e3i, t.e023, b.e1i, t.e012, -b.e03, t.e23i,
+                      b.e01, t.e12i),
           .e03i = dot(-b.e23, t.e02i, b.e31, t.e01i, -b.e1i, t.e031, b.e2i, t.e023, -b.e01, t.e31i,
                       b.e02, t.e23i),
           .e23i = dot(-b.e1i, t.e123, -b.e2i, t.e03i, b.e3i, t.e02i, -b.e31, t.e12i, b.e12, t.e31i,
                       b.e0i, t.e23i),
-          .e31i = dot(b.e1i, t.e03i, -b.e2i, t.e123, -b.e3i, t.e01i, b.e23, t.e12i, -b.e12, t.e23i,
+          .e31i = dot(-b.e2i, t.e123, -b.e3i, t.e01i, b.e1i, t.e03i, -b.e12, t.e23i, b.e23, t.e12i,
                       b.e0i, t.e31i),
-          .e12i = dot(-b.e1i, t.e02i, b.e2i, t.e01i, -b.e3i, t.e123, -b.e23, t.e31i, b.e31, t.e23i,
+          .e12i = dot(-b.e3i, t.e123, -b.e1i, t.e02i, b.e2i, t.e01i, -b.e23, t.e31i, b.e31, t.e23i,
                       b.e0i, t.e12i),
-          .e0123i = dot(b.e23, t.e01i, b.e31, t.e02i, b.e12, t.e03i, -b.e0i, t.e123, b.e1i, t.e023,
-                        b.e2i, t.e031, b.e3i, t.e012, b.e01, t.e23i, b.e02, t.e31i, b.e03, t.e12i)};
+          .e0123i = mul_add(-b.e0i, t.e123,
+                            dot(b.e23, t.e01i, b.e1i, t.e023, b.e01, t.e23i) +
+                                dot(b.e31, t.e02i, b.e2i, t.e031, b.e02, t.e31i) +
+                                dot(b.e12, t.e03i, b.e3i, t.e012, b.e03, t.e12i))};
 }
 
 /// gp: Versor Bivector -> Even
 /// a b, the geometric product.
-/// Cost: 120 mul, 112 add (72 fused).  Sparsity: 136 of 160 pairs of components.
+/// Cost: 120 mul, 112 add (70 fused).  Sparsity: 136 of 160 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Even<S> gp(const Versor<S>& m, const Bivector<S>& b) noexcept {
-  const S m_plus_s = m.s - m.e0i;
-  const S m_minus_s = m.s + m.e0i;
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) - turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s - m.e0i;
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S m_plus_e31 = three_m_plus_e12[2];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S plus_s =
+          dot(-b.e1i, m.e01, -b.e2i, m.e02, -b.e3i, m.e03, S(0.5),
+              dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, -b.e31, m_plus_e31, -b.e23, m_plus_e23));
+      const auto three_m_minus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s + m.e0i;
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const S minus_s =
+          dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, S(0.5),
+              dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, -b.e31, m_minus_e31, -b.e23, m_minus_e23));
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_plus_e23 =
+          dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e01),
+              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e01), -three_b_e1i,
+              four(m.e0123), four(S(0.5)),
+              dot(three_b_e23, four(m_plus_s), turned<2, 3, 4, 2>(three_b_e23), three_m_plus_e12,
+                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_m_plus_e12),
+                  -four(b.e0i), turned<2, 3, 4, 2>(three_m_plus_e12)));
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_minus_e23 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e1i), -three_b_e01,
+              four(m.e123i), four(S(0.5)),
+              dot(three_b_e23, four(m_minus_s), turned<2, 3, 4, 2>(three_b_e23), three_m_minus_e12,
+                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_m_minus_e12),
+                  four(b.e0i), turned<2, 3, 4, 2>(three_m_minus_e12)));
+      const auto all_e23 = three_plus_e23 + three_minus_e23;
+      const auto all_e1i =
+          dot(-four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e1i), -three_b_e23, four(m.e123i), three_b_e1i,
+              four(m_minus_s), turned<2, 3, 4, 2>(three_b_e1i), three_m_minus_e12,
+              -turned<3, 1, 2, 3>(three_b_e1i), turned<3, 1, 2, 3>(three_m_minus_e12));
+      const auto all_e023i = -three_plus_e23 + three_minus_e23;
+      const auto all_e01 =
+          dot(four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e01), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e01), -three_b_e23, four(m.e0123), three_b_e01,
+              four(m_plus_s), turned<2, 3, 4, 2>(three_b_e01), three_m_plus_e12,
+              -turned<3, 1, 2, 3>(three_b_e01), turned<3, 1, 2, 3>(three_m_plus_e12));
+      return {
+          .s = plus_s + minus_s,
+          .e23 = all_e23[0],
+          .e31 = all_e23[1],
+          .e12 = all_e23[2],
+          .e1i = all_e1i[0],
+          .e2i = all_e1i[1],
+          .e3i = all_e1i[2],
+          .e123i = mul_add(-b.e0i, m.e123i,
+                           lanes::total(dot(three_b_e23, three_m_e1i,
+                                            turned<3, 1, 2, 3>(three_b_e1i), three_m_minus_e12))),
+          .e0i = -plus_s + minus_s,
+          .e023i = all_e023i[0],
+          .e031i = all_e023i[1],
+          .e012i = all_e023i[2],
+          .e01 = all_e01[0],
+          .e02 = all_e01[1],
+          .e03 = all_e01[2],
+          .e0123 = mul_add(b.e0i, m.e0123,
+                           lanes::total(dot(three_b_e23, three_m_e01,
+                                            turned<3, 1, 2, 3>(three_b_e01), three_m_plus_e12)))};
+    }
+  }
   const S m_plus_e12 = m.e12 - m.e012i;
-  const S m_minus_e12 = m.e12 + m.e012i;
-  const S m_plus_e13 = -m.e31 + m.e031i;
-  const S m_minus_e13 = -m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 - m.e023i;
-  const S m_minus_e23 = m.e23 + m.e023i;
+  const S m_plus_e31 = m.e31 - m.e031i;
+  const S m_plus_s = m.s - m.e0i;
   const S plus_s =
       dot(-b.e1i, m.e01, -b.e2i, m.e02, -b.e3i, m.e03, S(0.5),
-          dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, b.e31, m_plus_e13, -b.e23, m_plus_e23));
+          dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, -b.e31, m_plus_e31, -b.e23, m_plus_e23));
+  const S m_minus_e12 = m.e12 + m.e012i;
+  const S m_minus_e23 = m.e23 + m.e023i;
+  const S m_minus_e31 = m.e31 + m.e031i;
+  const S m_minus_s = m.s + m.e0i;
   const S minus_s =
       dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, S(0.5),
-          dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, b.e31, m_minus_e13, -b.e23, m_minus_e23));
+          dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, -b.e31, m_minus_e31, -b.e23, m_minus_e23));
   const S plus_e23 =
       dot(-b.e3i, m.e02, b.e2i, m.e03, -b.e1i, m.e0123, S(0.5),
-          dot(b.e23, m_plus_s, b.e31, m_plus_e12, b.e12, m_plus_e13, -b.e0i, m_plus_e23));
-  const S minus_e23 =
-      dot(-b.e03, m.e2i, b.e02, m.e3i, -b.e01, m.e123i, S(0.5),
-          dot(b.e23, m_minus_s, b.e31, m_minus_e12, b.e12, m_minus_e13, b.e0i, m_minus_e23));
-  const S plus_e13 =
-      dot(-b.e3i, m.e01, b.e1i, m.e03, b.e2i, m.e0123, S(0.5),
-          dot(-b.e31, m_plus_s, b.e23, m_plus_e12, -b.e0i, m_plus_e13, -b.e12, m_plus_e23));
-  const S minus_e13 =
-      dot(-b.e03, m.e1i, b.e01, m.e3i, b.e02, m.e123i, S(0.5),
-          dot(-b.e31, m_minus_s, b.e23, m_minus_e12, b.e0i, m_minus_e13, -b.e12, m_minus_e23));
+          dot(b.e23, m_plus_s, b.e31, m_plus_e12, -b.e12, m_plus_e31, -b.e0i, m_plus_e23));
+  const S plus_e31 =
+      dot(-b.e1i, m.e03, b.e3i, m.e01, -b.e2i, m.e0123, S(0.5),
+          dot(b.e31, m_plus_s, b.e12, m_plus_e23, -b.e23, m_plus_e12, -b.e0i, m_plus_e31));
   const S plus_e12 =
       dot(-b.e2i, m.e01, b.e1i, m.e02, -b.e3i, m.e0123, S(0.5),
-          dot(b.e12, m_plus_s, -b.e0i, m_plus_e12, -b.e23, m_plus_e13, -b.e31, m_plus_e23));
+          dot(b.e12, m_plus_s, b.e23, m_plus_e31, -b.e31, m_plus_e23, -b.e0i, m_plus_e12));
+  const S minus_e23 =
+      dot(-b.e03, m.e2i, b.e02, m.e3i, -b.e01, m.e123i, S(0.5),
+          dot(b.e23, m_minus_s, b.e31, m_minus_e12, -b.e12, m_minus_e31, b.e0i, m_minus_e23));
+  const S minus_e31 =
+      dot(-b.e01, m.e3i, b.e03, m.e1i, -b.e02, m.e123i, S(0.5),
+          dot(b.e31, m_minus_s, b.e12, m_minus_e23, -b.e23, m_minus_e12, b.e0i, m_minus_e31));
   const S minus_e12 =
       dot(-b.e02, m.e1i, b.e01, m.e2i, -b.e03, m.e123i, S(0.5),
-          dot(b.e12, m_minus_s, b.e0i, m_minus_e12, -b.e23, m_minus_e13, -b.e31, m_minus_e23));
-  return {.s = plus_s + minus_s,
-          .e23 = plus_e23 + minus_e23,
-          .e31 = -plus_e13 - minus_e13,
-          .e12 = plus_e12 + minus_e12,
-          .e1i = dot(-b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i, -b.e23, m.e123i, b.e1i, m_minus_s,
-                     b.e2i, m_minus_e12, b.e3i, m_minus_e13),
-          .e2i = dot(b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i, -b.e31, m.e123i, b.e2i, m_minus_s,
-                     -b.e1i, m_minus_e12, b.e3i, m_minus_e23),
-          .e3i = dot(-b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i, -b.e12, m.e123i, b.e3i, m_minus_s,
-                     -b.e1i, m_minus_e13, -b.e2i, m_minus_e23),
-          .e123i = dot(b.e23, m.e1i, b.e31, m.e2i, b.e12, m.e3i, -b.e0i, m.e123i, b.e3i,
-                       m_minus_e12, -b.e2i, m_minus_e13, b.e1i, m_minus_e23),
-          .e0i = -plus_s + minus_s,
-          .e023i = -plus_e23 + minus_e23,
-          .e031i = plus_e13 - minus_e13,
-          .e012i = -plus_e12 + minus_e12,
-          .e01 = dot(b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03, -b.e23, m.e0123, b.e01, m_plus_s,
-                     b.e02, m_plus_e12, b.e03, m_plus_e13),
-          .e02 = dot(b.e12, m.e01, b.e0i, m.e02, -b.e23, m.e03, -b.e31, m.e0123, b.e02, m_plus_s,
-                     -b.e01, m_plus_e12, b.e03, m_plus_e23),
-          .e03 = dot(-b.e31, m.e01, b.e23, m.e02, b.e0i, m.e03, -b.e12, m.e0123, b.e03, m_plus_s,
-                     -b.e01, m_plus_e13, -b.e02, m_plus_e23),
-          .e0123 = dot(b.e23, m.e01, b.e31, m.e02, b.e12, m.e03, b.e0i, m.e0123, b.e03, m_plus_e12,
-                       -b.e02, m_plus_e13, b.e01, m_plus_e23)};
+          dot(b.e12, m_minus_s, b.e23, m_minus_e31, -b.e31, m_minus_e23, b.e0i, m_minus_e12));
+  return {
+      .s = plus_s + minus_s,
+      .e23 = plus_e23 + minus_e23,
+      .e31 = plus_e31 + minus_e31,
+      .e12 = plus_e12 + minus_e12,
+      .e1i = dot(-b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i, -b.e23, m.e123i, b.e1i, m_minus_s,
+                 b.e2i, m_minus_e12, -b.e3i, m_minus_e31),
+      .e2i = dot(-b.e0i, m.e2i, -b.e23, m.e3i, b.e12, m.e1i, -b.e31, m.e123i, b.e2i, m_minus_s,
+                 b.e3i, m_minus_e23, -b.e1i, m_minus_e12),
+      .e3i = dot(-b.e0i, m.e3i, -b.e31, m.e1i, b.e23, m.e2i, -b.e12, m.e123i, b.e3i, m_minus_s,
+                 b.e1i, m_minus_e31, -b.e2i, m_minus_e23),
+      .e123i =
+          mul_add(-b.e0i, m.e123i,
+                  dot(b.e23, m.e1i, b.e3i, m_minus_e12) + dot(b.e31, m.e2i, b.e1i, m_minus_e23) +
+                      dot(b.e12, m.e3i, b.e2i, m_minus_e31)),
+      .e0i = -plus_s + minus_s,
+      .e023i = -plus_e23 + minus_e23,
+      .e031i = -plus_e31 + minus_e31,
+      .e012i = -plus_e12 + minus_e12,
+      .e01 = dot(b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03, -b.e23, m.e0123, b.e01, m_plus_s, b.e02,
+                 m_plus_e12, -b.e03, m_plus_e31),
+      .e02 = dot(b.e0i, m.e02, -b.e23, m.e03, b.e12, m.e01, -b.e31, m.e0123, b.e02, m_plus_s, b.e03,
+                 m_plus_e23, -b.e01, m_plus_e12),
+      .e03 = dot(b.e0i, m.e03, -b.e31, m.e01, b.e23, m.e02, -b.e12, m.e0123, b.e03, m_plus_s, b.e01,
+                 m_plus_e31, -b.e02, m_plus_e23),
+      .e0123 = mul_add(b.e0i, m.e0123,
+                       dot(b.e23, m.e01, b.e03, m_plus_e12) + dot(b.e31, m.e02, b.e01, m_plus_e23) +
+                           dot(b.e12, m.e03, b.e02, m_plus_e31))};
 }
 
 /// outer: Vector Vector -> Bivector
@@ -864,57 +1115,133 @@ template <class S>
 
 /// commutator: Bivector Bivector -> Bivector
 /// a × b = ½(a b − b a).
-/// Cost: 60 mul, 50 add (40 fused).  Sparsity: 60 of 100 pairs of components.
+/// Cost: 60 mul, 50 add (39 fused).  Sparsity: 60 of 100 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> commutator(const Bivector<S>& a,
                                                               const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_a_e01 = four(a.e01, a.e02, a.e03, a.e01);
+      const auto three_a_e23 = four(a.e23, a.e31, a.e12, a.e23);
+      const auto three_a_e1i = four(a.e1i, a.e2i, a.e3i, a.e1i);
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto all_e23 = dot(-turned<2, 3, 4, 2>(three_a_e23), turned<3, 1, 2, 3>(three_b_e23),
+                               turned<3, 1, 2, 3>(three_a_e23), turned<2, 3, 4, 2>(three_b_e23),
+                               -turned<2, 3, 4, 2>(three_a_e1i), turned<3, 1, 2, 3>(three_b_e01),
+                               turned<3, 1, 2, 3>(three_a_e1i), turned<2, 3, 4, 2>(three_b_e01),
+                               -turned<2, 3, 4, 2>(three_a_e01), turned<3, 1, 2, 3>(three_b_e1i),
+                               turned<3, 1, 2, 3>(three_a_e01), turned<2, 3, 4, 2>(three_b_e1i));
+      const auto all_e1i = dot(-three_a_e1i, four(b.e0i), -turned<2, 3, 4, 2>(three_a_e1i),
+                               turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_a_e1i),
+                               turned<2, 3, 4, 2>(three_b_e23), -turned<2, 3, 4, 2>(three_a_e23),
+                               turned<3, 1, 2, 3>(three_b_e1i), turned<3, 1, 2, 3>(three_a_e23),
+                               turned<2, 3, 4, 2>(three_b_e1i), four(a.e0i), three_b_e1i);
+      const auto all_e01 = dot(three_a_e01, four(b.e0i), -turned<2, 3, 4, 2>(three_a_e01),
+                               turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_a_e01),
+                               turned<2, 3, 4, 2>(three_b_e23), -turned<2, 3, 4, 2>(three_a_e23),
+                               turned<3, 1, 2, 3>(three_b_e01), turned<3, 1, 2, 3>(three_a_e23),
+                               turned<2, 3, 4, 2>(three_b_e01), -four(a.e0i), three_b_e01);
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = lanes::total(dot(-three_a_e1i, three_b_e01, three_a_e01, three_b_e1i)),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   return {.e23 = dot(-a.e31, b.e12, a.e12, b.e31, -a.e2i, b.e03, a.e3i, b.e02, -a.e02, b.e3i, a.e03,
                      b.e2i),
-          .e31 = dot(a.e23, b.e12, -a.e12, b.e23, a.e1i, b.e03, -a.e3i, b.e01, a.e01, b.e3i, -a.e03,
-                     b.e1i),
+          .e31 = dot(-a.e12, b.e23, a.e23, b.e12, -a.e3i, b.e01, a.e1i, b.e03, -a.e03, b.e1i, a.e01,
+                     b.e3i),
           .e12 = dot(-a.e23, b.e31, a.e31, b.e23, -a.e1i, b.e02, a.e2i, b.e01, -a.e01, b.e2i, a.e02,
                      b.e1i),
           .e1i = dot(-a.e1i, b.e0i, -a.e2i, b.e12, a.e3i, b.e31, -a.e31, b.e3i, a.e12, b.e2i, a.e0i,
                      b.e1i),
-          .e2i = dot(a.e1i, b.e12, -a.e2i, b.e0i, -a.e3i, b.e23, a.e23, b.e3i, -a.e12, b.e1i, a.e0i,
+          .e2i = dot(-a.e2i, b.e0i, -a.e3i, b.e23, a.e1i, b.e12, -a.e12, b.e1i, a.e23, b.e3i, a.e0i,
                      b.e2i),
-          .e3i = dot(-a.e1i, b.e31, a.e2i, b.e23, -a.e3i, b.e0i, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
+          .e3i = dot(-a.e3i, b.e0i, -a.e1i, b.e31, a.e2i, b.e23, -a.e23, b.e2i, a.e31, b.e1i, a.e0i,
                      b.e3i),
-          .e0i = dot(-a.e1i, b.e01, -a.e2i, b.e02, -a.e3i, b.e03, a.e01, b.e1i, a.e02, b.e2i, a.e03,
-                     b.e3i),
+          .e0i = dot(-a.e1i, b.e01, a.e01, b.e1i) + dot(-a.e2i, b.e02, a.e02, b.e2i) +
+                 dot(-a.e3i, b.e03, a.e03, b.e3i),
           .e01 = dot(a.e01, b.e0i, -a.e02, b.e12, a.e03, b.e31, -a.e31, b.e03, a.e12, b.e02, -a.e0i,
                      b.e01),
-          .e02 = dot(a.e01, b.e12, a.e02, b.e0i, -a.e03, b.e23, a.e23, b.e03, -a.e12, b.e01, -a.e0i,
+          .e02 = dot(a.e02, b.e0i, -a.e03, b.e23, a.e01, b.e12, -a.e12, b.e01, a.e23, b.e03, -a.e0i,
                      b.e02),
-          .e03 = dot(-a.e01, b.e31, a.e02, b.e23, a.e03, b.e0i, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
+          .e03 = dot(a.e03, b.e0i, -a.e01, b.e31, a.e02, b.e23, -a.e23, b.e02, a.e31, b.e01, -a.e0i,
                      b.e03)};
 }
 
 /// commutator: Trivector Bivector -> Trivector
 /// a × b = ½(a b − b a).
-/// Cost: 60 mul, 50 add (40 fused).  Sparsity: 60 of 100 pairs of components.
+/// Cost: 60 mul, 50 add (39 fused).  Sparsity: 60 of 100 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Trivector<S> commutator(const Trivector<S>& t,
                                                                const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
+      const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
+      const auto all_e023 = dot(four(b.e0i), three_t_e023, -turned<3, 1, 2, 3>(three_b_e23),
+                                turned<2, 3, 4, 2>(three_t_e023), turned<2, 3, 4, 2>(three_b_e23),
+                                turned<3, 1, 2, 3>(three_t_e023), -three_b_e01, four(t.e123),
+                                -turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_t_e01i),
+                                turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_t_e01i));
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
+      const auto all_e01i = dot(-turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_t_e01i),
+                                turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_t_e01i),
+                                -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_t_e023),
+                                turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_t_e023),
+                                -turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_t_e23i),
+                                turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_t_e23i));
+      const auto all_e23i = dot(-four(b.e0i), three_t_e23i, -turned<3, 1, 2, 3>(three_b_e23),
+                                turned<2, 3, 4, 2>(three_t_e23i), turned<2, 3, 4, 2>(three_b_e23),
+                                turned<3, 1, 2, 3>(three_t_e23i), three_b_e1i, four(t.e123),
+                                -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_t_e01i),
+                                turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_t_e01i));
+      return {.e023 = all_e023[0],
+              .e031 = all_e023[1],
+              .e012 = all_e023[2],
+              .e123 = lanes::total(dot(three_b_e1i, three_t_e023, -three_b_e01, three_t_e23i)),
+              .e01i = all_e01i[0],
+              .e02i = all_e01i[1],
+              .e03i = all_e01i[2],
+              .e23i = all_e23i[0],
+              .e31i = all_e23i[1],
+              .e12i = all_e23i[2]};
+    }
+  }
   return {.e023 = dot(b.e0i, t.e023, -b.e12, t.e031, b.e31, t.e012, -b.e01, t.e123, -b.e03, t.e02i,
                       b.e02, t.e03i),
-          .e031 = dot(b.e12, t.e023, b.e0i, t.e031, -b.e23, t.e012, -b.e02, t.e123, b.e03, t.e01i,
-                      -b.e01, t.e03i),
-          .e012 = dot(-b.e31, t.e023, b.e23, t.e031, b.e0i, t.e012, -b.e03, t.e123, -b.e02, t.e01i,
+          .e031 = dot(b.e0i, t.e031, -b.e23, t.e012, b.e12, t.e023, -b.e02, t.e123, -b.e01, t.e03i,
+                      b.e03, t.e01i),
+          .e012 = dot(b.e0i, t.e012, -b.e31, t.e023, b.e23, t.e031, -b.e03, t.e123, -b.e02, t.e01i,
                       b.e01, t.e02i),
-          .e123 = dot(b.e1i, t.e023, b.e2i, t.e031, b.e3i, t.e012, -b.e01, t.e23i, -b.e02, t.e31i,
-                      -b.e03, t.e12i),
+          .e123 = dot(b.e1i, t.e023, -b.e01, t.e23i) + dot(b.e2i, t.e031, -b.e02, t.e31i) +
+                  dot(b.e3i, t.e012, -b.e03, t.e12i),
           .e01i = dot(-b.e12, t.e02i, b.e31, t.e03i, -b.e3i, t.e031, b.e2i, t.e012, -b.e03, t.e31i,
                       b.e02, t.e12i),
-          .e02i = dot(b.e12, t.e01i, -b.e23, t.e03i, b.e3i, t.e023, -b.e1i, t.e012, b.e03, t.e23i,
-                      -b.e01, t.e12i),
+          .e02i = dot(-b.e23, t.e03i, b.e12, t.e01i, -b.e1i, t.e012, b.e3i, t.e023, -b.e01, t.e12i,
+                      b.e03, t.e23i),
           .e03i = dot(-b.e31, t.e01i, b.e23, t.e02i, -b.e2i, t.e023, b.e1i, t.e031, -b.e02, t.e23i,
                       b.e01, t.e31i),
           .e23i = dot(-b.e0i, t.e23i, -b.e12, t.e31i, b.e31, t.e12i, b.e1i, t.e123, -b.e3i, t.e02i,
                       b.e2i, t.e03i),
-          .e31i = dot(b.e12, t.e23i, -b.e0i, t.e31i, -b.e23, t.e12i, b.e2i, t.e123, b.e3i, t.e01i,
-                      -b.e1i, t.e03i),
-          .e12i = dot(-b.e31, t.e23i, b.e23, t.e31i, -b.e0i, t.e12i, b.e3i, t.e123, -b.e2i, t.e01i,
+          .e31i = dot(-b.e0i, t.e31i, -b.e23, t.e12i, b.e12, t.e23i, b.e2i, t.e123, -b.e1i, t.e03i,
+                      b.e3i, t.e01i),
+          .e12i = dot(-b.e0i, t.e12i, -b.e31, t.e23i, b.e23, t.e31i, b.e3i, t.e123, -b.e2i, t.e01i,
                       b.e1i, t.e02i)};
 }
 
@@ -937,50 +1264,114 @@ template <class S>
 /// Cost: 120 mul, 100 add (80 fused).
 template <class S>
 [[nodiscard]] constexpr Vector<S> sandwich(const Versor<S>& m, const Vector<S>& v) noexcept {
-  const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
+      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+                                  turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
+                                  -three_m_e1i, four(v.e0), three_m_e01, four(v.ei));
+      const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
+      const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
+      const auto three_c_e012 = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const S c_e3 = three_c_e1[2];
+      const S c_e2 = three_c_e1[1];
+      const S c_e1 = three_c_e1[0];
+      const S c_e03i = three_c_e01i[2];
+      const S c_e02i = three_c_e01i[1];
+      const S c_e01i = three_c_e01i[0];
+      const S c_e023 = three_c_e012[1];
+      const S c_e031 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const auto all_e1 = mul_add(
+          four(S(2)),
+          dot(three_c_e01i, four(m.e0i), turned<2, 3, 4, 2>(three_c_e01i),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e01i),
+              turned<2, 3, 4, 2>(three_m_e023i), four(c_e123), three_m_e23, -three_c_e012,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
+              three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(three_c_e12i),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123),
+              three_c_e1, four(m.s), turned<2, 3, 4, 2>(three_c_e1),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1),
+              turned<2, 3, 4, 2>(three_m_e23), -four(c_e0), three_m_e1i, four(c_ei), three_m_e01),
+          three_v_e1);
+      const S c_e23i = three_c_e12i[1];
+      const S c_e31i = three_c_e12i[2];
+      const S c_e12i = three_c_e12i[0];
+      return {.e0 = mul_add(
+                  S(2),
+                  dot(c_e012, m.e12, -c_e012, m.e012i, c_e031, m.e31, -c_e031, m.e031i, c_e023,
+                      m.e23, -c_e023, m.e023i, c_e01i, m.e01, c_e02i, m.e02, c_e03i, m.e03, c_e123,
+                      m.e0123, c_e0, m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02, c_e3, m.e03),
+                  v.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = mul_add(
+                  S(2),
+                  dot(c_e12i, m.e12, c_e12i, m.e012i, c_e31i, m.e31, c_e31i, m.e031i, c_e23i, m.e23,
+                      c_e23i, m.e023i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i, -c_e123,
+                      m.e123i, c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
+                  v.ei)};
+    }
+  }
   const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0, m.e01, v.ei);
-  const S c_e2 = dot(m.e23, v.e3, -m.e12, v.e1, -m.e2i, v.e0, m.e02, v.ei);
-  const S c_e012 = dot(-m.e012i, v.e0, m.e0123, v.e3);
+  const S c_e2 = dot(-m.e12, v.e1, m.e23, v.e3, -m.e2i, v.e0, m.e02, v.ei);
   const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0, m.e03, v.ei);
-  const S c_e013 = dot(m.e031i, v.e0, -m.e0123, v.e2);
-  const S c_e023 = dot(-m.e023i, v.e0, m.e0123, v.e1);
+  const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
   const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
-  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
   const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
-  const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
-  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
+  const S c_e02i = dot(m.e012i, v.e1, -m.e023i, v.e3);
   const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
+  const S c_e012 = dot(-m.e012i, v.e0, m.e0123, v.e3);
+  const S c_e023 = dot(-m.e023i, v.e0, m.e0123, v.e1);
+  const S c_e031 = dot(-m.e031i, v.e0, m.e0123, v.e2);
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
   const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  const S c_e31i = dot(m.e031i, v.ei, -m.e123i, v.e2);
   return {
       .e0 =
           mul_add(S(2),
-                  dot(c_e012, m.e12, -c_e012, m.e012i, -c_e013, m.e31, c_e013, m.e031i, c_e023,
+                  dot(c_e012, m.e12, -c_e012, m.e012i, c_e031, m.e31, -c_e031, m.e031i, c_e023,
                       m.e23, -c_e023, m.e023i, c_e01i, m.e01, c_e02i, m.e02, c_e03i, m.e03, c_e123,
                       m.e0123, c_e0, m.s, -c_e0, m.e0i, c_e1, m.e01, c_e2, m.e02, c_e3, m.e03),
                   v.e0),
       .e1 =
           mul_add(S(2),
                   dot(c_e01i, m.e0i, c_e02i, m.e012i, -c_e03i, m.e031i, c_e123, m.e23, -c_e012,
-                      m.e2i, -c_e013, m.e3i, -c_e023, m.e123i, c_e12i, m.e02, c_e13i, m.e03, c_e23i,
+                      m.e2i, c_e031, m.e3i, -c_e023, m.e123i, c_e12i, m.e02, -c_e31i, m.e03, c_e23i,
                       m.e0123, c_e1, m.s, c_e2, m.e12, -c_e3, m.e31, -c_e0, m.e1i, c_ei, m.e01),
                   v.e1),
-      .e2 = mul_add(
-          S(2),
-          dot(-c_e01i, m.e012i, c_e02i, m.e0i, c_e03i, m.e023i, c_e123, m.e31, c_e012, m.e1i,
-              c_e013, m.e123i, -c_e023, m.e3i, -c_e12i, m.e01, -c_e13i, m.e0123, c_e23i, m.e03,
-              -c_e1, m.e12, c_e2, m.s, c_e3, m.e23, -c_e0, m.e2i, c_ei, m.e02),
-          v.e2),
-      .e3 = mul_add(
-          S(2),
-          dot(c_e01i, m.e031i, -c_e02i, m.e023i, c_e03i, m.e0i, c_e123, m.e12, -c_e012, m.e123i,
-              c_e013, m.e1i, c_e023, m.e2i, c_e12i, m.e0123, -c_e13i, m.e01, -c_e23i, m.e02,
-              c_e1, m.e31, -c_e2, m.e23, c_e3, m.s, -c_e0, m.e3i, c_ei, m.e03),
-          v.e3),
+      .e2 =
+          mul_add(S(2),
+                  dot(c_e02i, m.e0i, c_e03i, m.e023i, -c_e01i, m.e012i, c_e123, m.e31, -c_e023,
+                      m.e3i, c_e012, m.e1i, -c_e031, m.e123i, c_e23i, m.e03, -c_e12i, m.e01, c_e31i,
+                      m.e0123, c_e2, m.s, c_e3, m.e23, -c_e1, m.e12, -c_e0, m.e2i, c_ei, m.e02),
+                  v.e2),
+      .e3 =
+          mul_add(S(2),
+                  dot(c_e03i, m.e0i, c_e01i, m.e031i, -c_e02i, m.e023i, c_e123, m.e12, -c_e031,
+                      m.e1i, c_e023, m.e2i, -c_e012, m.e123i, c_e31i, m.e01, -c_e23i, m.e02, c_e12i,
+                      m.e0123, c_e3, m.s, c_e1, m.e31, -c_e2, m.e23, -c_e0, m.e3i, c_ei, m.e03),
+                  v.e3),
       .ei =
           mul_add(S(2),
-                  dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i,
-                      m.e23, c_e23i, m.e023i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i, -c_e123,
+                  dot(c_e12i, m.e12, c_e12i, m.e012i, c_e31i, m.e31, c_e31i, m.e031i, c_e23i, m.e23,
+                      c_e23i, m.e023i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i, -c_e123,
                       m.e123i, c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
                   v.ei)};
 }
@@ -988,203 +1379,409 @@ template <class S>
 /// sandwich: Versor Bivector -> Bivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
-/// Cost: 198 mul, 187 add (140 fused).
+/// Cost: 198 mul, 187 add (139 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Versor<S>& m, const Bivector<S>& b) noexcept {
-  const S c_e01 =
-      dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i, b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03);
-  const S c_e02 =
-      dot(b.e03, m.e23, -b.e01, m.e12, -b.e02, m.e0i, b.e12, m.e01, b.e0i, m.e02, -b.e23, m.e03);
-  const S c_e12 =
-      dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i, -b.e2i, m.e01, b.e1i, m.e02);
-  const S c_e03 =
-      dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i, -b.e31, m.e01, b.e23, m.e02, b.e0i, m.e03);
-  const S c_e13 =
-      dot(-b.e12, m.e23, b.e23, m.e12, -b.e03, m.e1i, b.e01, m.e3i, -b.e3i, m.e01, b.e1i, m.e03);
-  const S c_e23 =
-      dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i, -b.e3i, m.e02, b.e2i, m.e03);
-  const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
-  const S c_e0i =
-      dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, b.e1i, m.e01, b.e2i, m.e02, b.e3i, m.e03);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e1i =
+          dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
+              four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e1i));
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e23), -three_b_e01,
+              four(m.e0i), four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e01), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e01));
+      const S c_e0i = lanes::total(dot(-three_b_e01, three_m_e1i, three_b_e1i, three_m_e01));
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
+              three_b_e01, turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_b_e1i),
+              three_m_e01, three_b_e1i, turned<2, 3, 4, 2>(three_m_e01));
+      const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
+      const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e012i =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i),
+              turned<3, 1, 2, 3>(three_b_e1i), four(m.e0123));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const auto all_e23 = mul_add(
+          four(S(2)),
+          dot(three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
+              four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, -three_c_e12,
+              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e12), four(m.s),
+              four(c_e0i), three_m_e023i, -three_c_e01, four(m.e123i),
+              turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), -three_c_e1i,
+              four(m.e0123), turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01)),
+          three_b_e23);
+      const auto all_e1i =
+          mul_add(four(S(2)),
+                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), -four(c_e0i), three_m_e1i, three_c_e1i,
+                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_b_e1i);
+      const S c_e3i = three_c_e1i[2];
+      const S c_e2i = three_c_e1i[1];
+      const S c_e1i = three_c_e1i[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const S c_e23 = three_c_e12[1];
+      const S c_e31 = three_c_e12[2];
+      const S c_e12 = three_c_e12[0];
+      const S c_e023i = three_c_e012i[1];
+      const S c_e031i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const auto all_e01 =
+          mul_add(four(S(2)),
+                  dot(-three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
+                      turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
+                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), -four(c_e0123),
+                      turned<2, 3, 4, 2>(three_m_minus_e12), four(c_e0i), three_m_e01, three_c_e01,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
+                      turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  three_b_e01);
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = mul_add(S(2),
+                             dot(c_e012i, m.e12, c_e031i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i,
+                                 c_e123i, m.e0123, -c_e12, m.e012i, -c_e31, m.e031i, -c_e23,
+                                 m.e023i, c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03, m.e3i,
+                                 c_e1i, m.e01, c_e2i, m.e02, c_e3i, m.e03),
+                             b.e0i),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S c_e1i =
       dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
-  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i, b.e3i, m.e0123);
+      dot(-b.e1i, m.e12, b.e3i, m.e23, b.e2i, m.e0i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e12, m.e1i);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
-  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i, -b.e2i, m.e0123);
-  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i, b.e1i, m.e0123);
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e0i, m.e3i, -b.e31, m.e1i, b.e23, m.e2i);
+  const S c_e01 =
+      dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i, b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03);
+  const S c_e02 =
+      dot(-b.e01, m.e12, b.e03, m.e23, -b.e02, m.e0i, b.e0i, m.e02, -b.e23, m.e03, b.e12, m.e01);
+  const S c_e03 =
+      dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i, b.e0i, m.e03, -b.e31, m.e01, b.e23, m.e02);
+  const S c_e0i = dot(-b.e01, m.e1i, b.e1i, m.e01) + dot(-b.e02, m.e2i, b.e2i, m.e02) +
+                  dot(-b.e03, m.e3i, b.e3i, m.e03);
+  const S c_e12 =
+      dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i, -b.e2i, m.e01, b.e1i, m.e02);
+  const S c_e23 =
+      dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i, -b.e3i, m.e02, b.e2i, m.e03);
+  const S c_e31 =
+      dot(-b.e23, m.e12, b.e12, m.e23, -b.e01, m.e3i, b.e03, m.e1i, -b.e1i, m.e03, b.e3i, m.e01);
   const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
-  const S c_plus_e12 = -c_e012i + c_e12;
-  const S c_minus_e12 = c_e012i + c_e12;
-  const S c_plus_e13 = -c_e013i + c_e13;
-  const S c_minus_e13 = c_e013i + c_e13;
-  const S c_plus_e23 = -c_e023i + c_e23;
-  const S c_minus_e23 = c_e023i + c_e23;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
+  const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i, b.e3i, m.e0123);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i, b.e1i, m.e0123);
+  const S c_e031i = dot(-b.e23, m.e012i, b.e12, m.e023i, -b.e02, m.e123i, b.e2i, m.e0123);
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
+  const S c_minus_e12 = c_e012i + c_e12;
+  const S c_minus_e23 = c_e023i + c_e23;
+  const S c_minus_e31 = c_e031i + c_e31;
+  const S m_minus_e12 = -m.e12 + m.e012i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S m_minus_s = m.s - m.e0i;
+  const S c_plus_e12 = -c_e012i + c_e12;
+  const S c_plus_e23 = -c_e023i + c_e23;
+  const S c_plus_e31 = -c_e031i + c_e31;
   return {.e23 = mul_add(
               S(2),
-              dot(c_e012i, m.e031i, c_e013i, m.e012i, -c_e023i, m.e0i, c_e0123, m.e1i, c_e123i,
-                  m.e01, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s, c_e0i, m.e023i, -c_e01, m.e123i,
+              dot(c_e012i, m.e031i, -c_e031i, m.e012i, -c_e023i, m.e0i, c_e0123, m.e1i, c_e123i,
+                  m.e01, -c_e12, m.e31, c_e31, m.e12, c_e23, m.s, c_e0i, m.e023i, -c_e01, m.e123i,
                   c_e02, m.e3i, -c_e03, m.e2i, -c_e1i, m.e0123, c_e2i, m.e03, -c_e3i, m.e02),
               b.e23),
           .e31 = mul_add(
               S(2),
-              dot(-c_e012i, m.e023i, c_e013i, m.e0i, c_e023i, m.e012i, c_e0123, m.e2i, c_e123i,
-                  m.e02, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, c_e0i, m.e031i, -c_e01, m.e3i,
-                  -c_e02, m.e123i, c_e03, m.e1i, -c_e1i, m.e03, -c_e2i, m.e0123, c_e3i, m.e01),
+              dot(c_e023i, m.e012i, -c_e012i, m.e023i, -c_e031i, m.e0i, c_e0123, m.e2i, c_e123i,
+                  m.e02, -c_e23, m.e12, c_e12, m.e23, c_e31, m.s, c_e0i, m.e031i, -c_e02, m.e123i,
+                  c_e03, m.e1i, -c_e01, m.e3i, -c_e2i, m.e0123, c_e3i, m.e01, -c_e1i, m.e03),
               b.e31),
           .e12 = mul_add(
               S(2),
-              dot(-c_e012i, m.e0i, -c_e013i, m.e023i, -c_e023i, m.e031i, c_e0123, m.e3i, c_e123i,
-                  m.e03, c_e12, m.s, c_e13, m.e23, c_e23, m.e31, c_e0i, m.e012i, c_e01, m.e2i,
-                  -c_e02, m.e1i, -c_e03, m.e123i, c_e1i, m.e02, -c_e2i, m.e01, -c_e3i, m.e0123),
+              dot(c_e031i, m.e023i, -c_e023i, m.e031i, -c_e012i, m.e0i, c_e0123, m.e3i, c_e123i,
+                  m.e03, -c_e31, m.e23, c_e23, m.e31, c_e12, m.s, c_e0i, m.e012i, -c_e03, m.e123i,
+                  c_e01, m.e2i, -c_e02, m.e1i, -c_e3i, m.e0123, c_e1i, m.e02, -c_e2i, m.e01),
               b.e12),
           .e1i = mul_add(S(2),
-                         dot(-c_minus_e12, m.e2i, -c_minus_e13, m.e3i, -c_minus_e23, m.e123i,
+                         dot(-c_minus_e12, m.e2i, c_minus_e31, m.e3i, -c_minus_e23, m.e123i,
                              c_e123i, m_plus_e23, -c_e0i, m.e1i, c_e1i, m_plus_s, c_e2i, m_plus_e12,
                              -c_e3i, m_plus_e13),
                          b.e1i),
           .e2i = mul_add(S(2),
-                         dot(c_minus_e12, m.e1i, c_minus_e13, m.e123i, -c_minus_e23, m.e3i, c_e123i,
-                             m_plus_e13, -c_e0i, m.e2i, -c_e1i, m_plus_e12, c_e2i, m_plus_s, c_e3i,
-                             m_plus_e23),
+                         dot(-c_minus_e23, m.e3i, c_minus_e12, m.e1i, -c_minus_e31, m.e123i,
+                             c_e123i, m_plus_e13, -c_e0i, m.e2i, c_e2i, m_plus_s, c_e3i, m_plus_e23,
+                             -c_e1i, m_plus_e12),
                          b.e2i),
           .e3i = mul_add(S(2),
-                         dot(-c_minus_e12, m.e123i, c_minus_e13, m.e1i, c_minus_e23, m.e2i, c_e123i,
-                             m_plus_e12, -c_e0i, m.e3i, c_e1i, m_plus_e13, -c_e2i, m_plus_e23,
-                             c_e3i, m_plus_s),
+                         dot(-c_minus_e31, m.e1i, c_minus_e23, m.e2i, -c_minus_e12, m.e123i,
+                             c_e123i, m_plus_e12, -c_e0i, m.e3i, c_e3i, m_plus_s, c_e1i, m_plus_e13,
+                             -c_e2i, m_plus_e23),
                          b.e3i),
           .e0i = mul_add(
               S(2),
-              dot(c_e012i, m.e12, -c_e013i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i, c_e123i,
-                  m.e0123, -c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e0i, m.s, -c_e01,
+              dot(c_e012i, m.e12, c_e031i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i, c_e123i,
+                  m.e0123, -c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e0i, m.s, -c_e01,
                   m.e1i, -c_e02, m.e2i, -c_e03, m.e3i, c_e1i, m.e01, c_e2i, m.e02, c_e3i, m.e03),
               b.e0i),
           .e01 = mul_add(S(2),
-                         dot(-c_plus_e12, m.e02, -c_plus_e13, m.e03, -c_plus_e23, m.e0123, -c_e0123,
+                         dot(-c_plus_e12, m.e02, c_plus_e31, m.e03, -c_plus_e23, m.e0123, -c_e0123,
                              m_minus_e23, c_e0i, m.e01, c_e01, m_minus_s, -c_e02, m_minus_e12,
-                             -c_e03, m_minus_e13),
+                             c_e03, m_minus_e31),
                          b.e01),
-          .e02 = mul_add(
-              S(2),
-              dot(c_plus_e12, m.e01, c_plus_e13, m.e0123, -c_plus_e23, m.e03, c_e0123, m_minus_e13,
-                  c_e0i, m.e02, c_e01, m_minus_e12, c_e02, m_minus_s, -c_e03, m_minus_e23),
-              b.e02),
-          .e03 = mul_add(
-              S(2),
-              dot(-c_plus_e12, m.e0123, c_plus_e13, m.e01, c_plus_e23, m.e02, -c_e0123, m_minus_e12,
-                  c_e0i, m.e03, c_e01, m_minus_e13, c_e02, m_minus_e23, c_e03, m_minus_s),
-              b.e03)};
+          .e02 = mul_add(S(2),
+                         dot(-c_plus_e23, m.e03, c_plus_e12, m.e01, -c_plus_e31, m.e0123, -c_e0123,
+                             m_minus_e31, c_e0i, m.e02, c_e02, m_minus_s, -c_e03, m_minus_e23,
+                             c_e01, m_minus_e12),
+                         b.e02),
+          .e03 = mul_add(S(2),
+                         dot(-c_plus_e31, m.e01, c_plus_e23, m.e02, -c_plus_e12, m.e0123, -c_e0123,
+                             m_minus_e12, c_e0i, m.e03, c_e03, m_minus_s, -c_e01, m_minus_e31,
+                             c_e02, m_minus_e23),
+                         b.e03)};
 }
 
 /// sandwich: Versor Trivector -> Trivector
 /// m x ~m: moves x by m.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
-/// Cost: 198 mul, 187 add (140 fused).
+/// Cost: 198 mul, 187 add (139 fused).
 template <class S>
 [[nodiscard]] constexpr Trivector<S> sandwich(const Versor<S>& m, const Trivector<S>& t) noexcept {
-  const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
-  const S c_e1 = dot(m.e031i, t.e03i, -m.e012i, t.e02i, m.e123i, t.e023, -m.e0123, t.e23i);
-  const S c_e2 = dot(-m.e023i, t.e03i, m.e012i, t.e01i, m.e123i, t.e031, -m.e0123, t.e31i);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
+      const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
+      const auto three_c_e012 =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e023), turned<2, 3, 4, 2>(three_m_e23),
+              three_t_e023, -four(m.e0i), turned<3, 1, 2, 3>(three_t_e023), -three_m_e01,
+              turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e01), three_t_e01i,
+              turned<3, 1, 2, 3>(three_m_e01), four(t.e123));
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
+      const S c_e123 = lanes::total(dot(-three_m_e1i, three_t_e023, three_m_e01, three_t_e23i));
+      const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
+      const auto three_c_e1 =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_t_e01i),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_t_e01i), four(m.e123i),
+              three_t_e023, -four(m.e0123), three_t_e23i);
+      const auto three_c_e01i =
+          dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_t_e01i),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_t_e01i),
+              -turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_t_e023),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_t_e023),
+              -turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_t_e23i),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_t_e23i));
+      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
+      const auto three_c_e12i =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e23i), turned<2, 3, 4, 2>(three_m_e23),
+              three_t_e23i, four(m.e0i), turned<3, 1, 2, 3>(three_t_e23i), -three_m_e1i,
+              turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e1i), three_t_e01i,
+              -turned<3, 1, 2, 3>(three_m_e1i), four(t.e123));
+      const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto all_e023 = mul_add(
+          four(S(2)),
+          dot(-three_c_plus_e1, four(m.e0123), turned<2, 3, 4, 2>(three_c_plus_e1),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(three_c_plus_e1),
+              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
+              four(c_e123), three_m_e01, three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
+              -turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
+              turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          three_t_e023);
+      const S c_e23i = three_c_e12i[1];
+      const S c_e31i = three_c_e12i[2];
+      const S c_e12i = three_c_e12i[0];
+      const S c_e023 = three_c_e012[1];
+      const S c_e031 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const S c_e03i = three_c_e01i[2];
+      const S c_e02i = three_c_e01i[1];
+      const S c_e01i = three_c_e01i[0];
+      const S c_e3 = three_c_e1[2];
+      const S c_e2 = three_c_e1[1];
+      const S c_e1 = three_c_e1[0];
+      const auto all_e01i = mul_add(
+          four(S(2)),
+          dot(three_c_e1, four(m.e0i), turned<2, 3, 4, 2>(three_c_e1),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e1),
+              turned<2, 3, 4, 2>(three_m_e023i), -four(c_e0), three_m_e1i, -four(c_ei), three_m_e01,
+              three_c_e01i, four(m.s), turned<2, 3, 4, 2>(three_c_e01i),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01i),
+              turned<2, 3, 4, 2>(three_m_e23), four(c_e123), three_m_e023i, -three_c_e012,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
+              -three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_c_e12i),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123)),
+          three_t_e01i);
+      const auto all_e23i = mul_add(
+          four(S(2)),
+          dot(three_c_minus_e1, four(m.e123i), -turned<2, 3, 4, 2>(three_c_minus_e1),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e1),
+              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(three_m_plus_e12),
+              -four(c_e123), three_m_e1i, -three_c_e12i, turned<3, 1, 2, 3>(three_m_plus_e12),
+              turned<3, 1, 2, 3>(three_c_e12i), three_m_plus_e12, turned<2, 3, 4, 2>(three_c_e12i),
+              four(m_plus_s)),
+          three_t_e23i);
+      return {.e023 = all_e023[0],
+              .e031 = all_e023[1],
+              .e012 = all_e023[2],
+              .e123 = mul_add(S(2),
+                              dot(-c_e1, m.e23, -c_e2, m.e31, -c_e3, m.e12, c_e0, m.e123i, -c_ei,
+                                  m.e0123, -c_e01i, m.e023i, -c_e02i, m.e031i, -c_e03i, m.e012i,
+                                  c_e123, m.s, -c_e012, m.e3i, -c_e031, m.e2i, -c_e023, m.e1i,
+                                  c_e12i, m.e03, c_e31i, m.e02, c_e23i, m.e01),
+                              t.e123),
+              .e01i = all_e01i[0],
+              .e02i = all_e01i[1],
+              .e03i = all_e01i[2],
+              .e23i = all_e23i[0],
+              .e31i = all_e23i[1],
+              .e12i = all_e23i[2]};
+    }
+  }
   const S c_e012 = dot(-m.e23, t.e031, m.e31, t.e023, -m.e0i, t.e012, -m.e01, t.e02i, m.e02, t.e01i,
                        m.e03, t.e123);
+  const S c_e023 = dot(-m.e31, t.e012, m.e12, t.e031, -m.e0i, t.e023, -m.e02, t.e03i, m.e03, t.e02i,
+                       m.e01, t.e123);
+  const S c_e031 = dot(-m.e12, t.e023, m.e23, t.e012, -m.e0i, t.e031, -m.e03, t.e01i, m.e01, t.e03i,
+                       m.e02, t.e123);
+  const S m_minus_s = m.s - m.e0i;
+  const S m_minus_e12 = -m.e12 + m.e012i;
+  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_e123 = dot(-m.e1i, t.e023, m.e01, t.e23i) + dot(-m.e2i, t.e031, m.e02, t.e31i) +
+                   dot(-m.e3i, t.e012, m.e03, t.e12i);
+  const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
+  const S c_e1 = dot(m.e031i, t.e03i, -m.e012i, t.e02i, m.e123i, t.e023, -m.e0123, t.e23i);
+  const S c_e2 = dot(m.e012i, t.e01i, -m.e023i, t.e03i, m.e123i, t.e031, -m.e0123, t.e31i);
   const S c_e3 = dot(m.e023i, t.e02i, -m.e031i, t.e01i, m.e123i, t.e012, -m.e0123, t.e12i);
-  const S c_e013 = dot(-m.e23, t.e012, m.e12, t.e023, m.e0i, t.e031, -m.e01, t.e03i, -m.e02, t.e123,
-                       m.e03, t.e01i);
-  const S c_e023 = dot(-m.e31, t.e012, m.e12, t.e031, -m.e0i, t.e023, m.e01, t.e123, -m.e02, t.e03i,
-                       m.e03, t.e02i);
-  const S c_e123 = dot(-m.e1i, t.e023, -m.e2i, t.e031, -m.e3i, t.e012, m.e01, t.e23i, m.e02, t.e31i,
-                       m.e03, t.e12i);
-  const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
   const S c_e01i = dot(-m.e31, t.e03i, m.e12, t.e02i, -m.e2i, t.e012, m.e3i, t.e031, -m.e02, t.e12i,
                        m.e03, t.e31i);
-  const S c_e02i = dot(m.e23, t.e03i, -m.e12, t.e01i, m.e1i, t.e012, -m.e3i, t.e023, m.e01, t.e12i,
-                       -m.e03, t.e23i);
-  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, m.e0i, t.e12i, -m.e1i, t.e02i, m.e2i, t.e01i,
-                       -m.e3i, t.e123);
+  const S c_e02i = dot(-m.e12, t.e01i, m.e23, t.e03i, -m.e3i, t.e023, m.e1i, t.e012, -m.e03, t.e23i,
+                       m.e01, t.e12i);
   const S c_e03i = dot(-m.e23, t.e02i, m.e31, t.e01i, -m.e1i, t.e031, m.e2i, t.e023, -m.e01, t.e31i,
                        m.e02, t.e23i);
-  const S c_e13i = dot(-m.e23, t.e12i, m.e12, t.e23i, -m.e0i, t.e31i, -m.e1i, t.e03i, m.e2i, t.e123,
-                       m.e3i, t.e01i);
-  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, m.e0i, t.e23i, -m.e1i, t.e123, -m.e2i, t.e03i,
-                       m.e3i, t.e02i);
   const S c_plus_e1 = c_e1 + c_e01i;
-  const S c_minus_e1 = c_e1 - c_e01i;
   const S c_plus_e2 = c_e2 + c_e02i;
-  const S c_minus_e2 = c_e2 - c_e02i;
   const S c_plus_e3 = c_e3 + c_e03i;
-  const S c_minus_e3 = c_e3 - c_e03i;
+  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, m.e0i, t.e12i, -m.e1i, t.e02i, m.e2i, t.e01i,
+                       -m.e3i, t.e123);
+  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, m.e0i, t.e23i, -m.e2i, t.e03i, m.e3i, t.e02i,
+                       -m.e1i, t.e123);
+  const S c_e31i = dot(-m.e12, t.e23i, m.e23, t.e12i, m.e0i, t.e31i, -m.e3i, t.e01i, m.e1i, t.e03i,
+                       -m.e2i, t.e123);
+  const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
   const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
-  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S c_minus_e1 = c_e1 - c_e01i;
+  const S c_minus_e2 = c_e2 - c_e02i;
+  const S c_minus_e3 = c_e3 - c_e03i;
   return {
       .e023 =
           mul_add(S(2),
                   dot(-c_plus_e1, m.e0123, c_plus_e2, m.e03, -c_plus_e3, m.e02, c_e0, m_minus_e23,
-                      c_e123, m.e01, -c_e012, m_minus_e13, c_e013, m_minus_e12, c_e023, m_minus_s),
+                      c_e123, m.e01, c_e012, m_minus_e31, -c_e031, m_minus_e12, c_e023, m_minus_s),
                   t.e023),
       .e031 =
           mul_add(S(2),
-                  dot(-c_plus_e1, m.e03, -c_plus_e2, m.e0123, c_plus_e3, m.e01, -c_e0, m_minus_e13,
-                      c_e123, m.e02, -c_e012, m_minus_e23, -c_e013, m_minus_s, c_e023, m_minus_e12),
+                  dot(-c_plus_e2, m.e0123, c_plus_e3, m.e01, -c_plus_e1, m.e03, c_e0, m_minus_e31,
+                      c_e123, m.e02, c_e023, m_minus_e12, -c_e012, m_minus_e23, c_e031, m_minus_s),
                   t.e031),
       .e012 =
           mul_add(S(2),
-                  dot(c_plus_e1, m.e02, -c_plus_e2, m.e01, -c_plus_e3, m.e0123, c_e0, m_minus_e12,
-                      c_e123, m.e03, c_e012, m_minus_s, -c_e013, m_minus_e23, c_e023, m_minus_e13),
+                  dot(-c_plus_e3, m.e0123, c_plus_e1, m.e02, -c_plus_e2, m.e01, c_e0, m_minus_e12,
+                      c_e123, m.e03, c_e031, m_minus_e23, -c_e023, m_minus_e31, c_e012, m_minus_s),
                   t.e012),
       .e123 = mul_add(
           S(2),
           dot(-c_e1, m.e23, -c_e2, m.e31, -c_e3, m.e12, c_e0, m.e123i, -c_ei, m.e0123, -c_e01i,
-              m.e023i, -c_e02i, m.e031i, -c_e03i, m.e012i, c_e123, m.s, -c_e012, m.e3i, c_e013,
-              m.e2i, -c_e023, m.e1i, c_e12i, m.e03, -c_e13i, m.e02, c_e23i, m.e01),
+              m.e023i, -c_e02i, m.e031i, -c_e03i, m.e012i, c_e123, m.s, -c_e012, m.e3i, -c_e031,
+              m.e2i, -c_e023, m.e1i, c_e12i, m.e03, c_e31i, m.e02, c_e23i, m.e01),
           t.e123),
       .e01i = mul_add(
           S(2),
           dot(c_e1, m.e0i, c_e2, m.e012i, -c_e3, m.e031i, -c_e0, m.e1i, -c_ei, m.e01, c_e01i, m.s,
-              c_e02i, m.e12, -c_e03i, m.e31, c_e123, m.e023i, -c_e012, m.e2i, -c_e013, m.e3i,
-              -c_e023, m.e123i, -c_e12i, m.e02, -c_e13i, m.e03, -c_e23i, m.e0123),
+              c_e02i, m.e12, -c_e03i, m.e31, c_e123, m.e023i, -c_e012, m.e2i, c_e031, m.e3i,
+              -c_e023, m.e123i, -c_e12i, m.e02, c_e31i, m.e03, -c_e23i, m.e0123),
           t.e01i),
       .e02i = mul_add(
           S(2),
-          dot(-c_e1, m.e012i, c_e2, m.e0i, c_e3, m.e023i, -c_e0, m.e2i, -c_ei, m.e02, -c_e01i,
-              m.e12, c_e02i, m.s, c_e03i, m.e23, c_e123, m.e031i, c_e012, m.e1i, c_e013, m.e123i,
-              -c_e023, m.e3i, c_e12i, m.e01, c_e13i, m.e0123, -c_e23i, m.e03),
+          dot(c_e2, m.e0i, c_e3, m.e023i, -c_e1, m.e012i, -c_e0, m.e2i, -c_ei, m.e02, c_e02i, m.s,
+              c_e03i, m.e23, -c_e01i, m.e12, c_e123, m.e031i, -c_e023, m.e3i, c_e012, m.e1i,
+              -c_e031, m.e123i, -c_e23i, m.e03, c_e12i, m.e01, -c_e31i, m.e0123),
           t.e02i),
-      .e03i =
-          mul_add(S(2),
-                  dot(c_e1, m.e031i, -c_e2, m.e023i, c_e3, m.e0i, -c_e0, m.e3i, -c_ei, m.e03,
-                      c_e01i, m.e31, -c_e02i, m.e23, c_e03i, m.s, c_e123, m.e012i, -c_e012, m.e123i,
-                      c_e013, m.e1i, c_e023, m.e2i, -c_e12i, m.e0123, c_e13i, m.e01, c_e23i, m.e02),
-                  t.e03i),
+      .e03i = mul_add(
+          S(2),
+          dot(c_e3, m.e0i, c_e1, m.e031i, -c_e2, m.e023i, -c_e0, m.e3i, -c_ei, m.e03, c_e03i, m.s,
+              c_e01i, m.e31, -c_e02i, m.e23, c_e123, m.e012i, -c_e031, m.e1i, c_e023, m.e2i,
+              -c_e012, m.e123i, -c_e31i, m.e01, c_e23i, m.e02, -c_e12i, m.e0123),
+          t.e03i),
       .e23i =
           mul_add(S(2),
                   dot(c_minus_e1, m.e123i, -c_minus_e2, m.e3i, c_minus_e3, m.e2i, -c_ei, m_plus_e23,
-                      -c_e123, m.e1i, -c_e12i, m_plus_e13, -c_e13i, m_plus_e12, c_e23i, m_plus_s),
+                      -c_e123, m.e1i, -c_e12i, m_plus_e13, c_e31i, m_plus_e12, c_e23i, m_plus_s),
                   t.e23i),
       .e31i =
           mul_add(S(2),
-                  dot(c_minus_e1, m.e3i, c_minus_e2, m.e123i, -c_minus_e3, m.e1i, -c_ei, m_plus_e13,
-                      -c_e123, m.e2i, c_e12i, m_plus_e23, -c_e13i, m_plus_s, -c_e23i, m_plus_e12),
+                  dot(c_minus_e2, m.e123i, -c_minus_e3, m.e1i, c_minus_e1, m.e3i, -c_ei, m_plus_e13,
+                      -c_e123, m.e2i, -c_e23i, m_plus_e12, c_e12i, m_plus_e23, c_e31i, m_plus_s),
                   t.e31i),
       .e12i =
           mul_add(S(2),
-                  dot(-c_minus_e1, m.e2i, c_minus_e2, m.e1i, c_minus_e3, m.e123i, -c_ei, m_plus_e12,
-                      -c_e123, m.e3i, c_e12i, m_plus_s, c_e13i, m_plus_e23, c_e23i, m_plus_e13),
+                  dot(c_minus_e3, m.e123i, -c_minus_e1, m.e2i, c_minus_e2, m.e1i, -c_ei, m_plus_e12,
+                      -c_e123, m.e3i, -c_e31i, m_plus_e23, c_e23i, m_plus_e13, c_e12i, m_plus_s),
                   t.e12i)};
 }
 
@@ -1195,50 +1792,112 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Quadvector<S> sandwich(const Versor<S>& m,
                                                const Quadvector<S>& q) noexcept {
-  const S c_e01 = dot(m.e023i, q.e0123, -m.e0123, q.e023i);
-  const S c_e02 = dot(m.e031i, q.e0123, -m.e0123, q.e031i);
-  const S c_e12 = dot(-m.e023i, q.e031i, m.e031i, q.e023i);
-  const S c_e03 = dot(m.e012i, q.e0123, -m.e0123, q.e012i);
-  const S c_e13 = dot(-m.e023i, q.e012i, m.e012i, q.e023i);
-  const S c_e23 = dot(-m.e031i, q.e012i, m.e012i, q.e031i);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_q_e023i = four(q.e023i, q.e031i, q.e012i, q.e023i);
+      const auto three_c_e012i =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_q_e023i), turned<2, 3, 4, 2>(three_m_e23),
+              three_q_e023i, -turned<3, 1, 2, 3>(three_m_e1i), four(q.e0123),
+              turned<3, 1, 2, 3>(three_m_e01), four(q.e123i));
+      const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
+      const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e12 = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
+                                   turned<2, 3, 4, 2>(three_m_e023i), three_q_e023i);
+      const auto three_c_e01 = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
+      const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
+      const auto three_c_e1i = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
+      const S c_e023i = three_c_e012i[1];
+      const S c_e031i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const S c_e23 = three_c_e12[1];
+      const S c_e31 = three_c_e12[2];
+      const S c_e12 = three_c_e12[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const auto all_e023i = mul_add(
+          four(S(2)),
+          dot(three_c_e12, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e12), four(m.e0i),
+              -four(c_e0i), three_m_e23, three_c_e01, four(m.e123i),
+              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), -three_c_e1i,
+              four(m.e0123), turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01), -three_c_e012i,
+              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e012i), four(m.s),
+              -four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01),
+          three_q_e023i);
+      const S c_e3i = three_c_e1i[2];
+      const S c_e2i = three_c_e1i[1];
+      const S c_e1i = three_c_e1i[0];
+      return {.e0123 = mul_add(S(2),
+                               dot(-c_e01, m.e23, c_e01, m.e023i, -c_e02, m.e31, c_e02, m.e031i,
+                                   -c_e03, m.e12, c_e03, m.e012i, -c_e12, m.e03, -c_e31, m.e02,
+                                   -c_e23, m.e01, -c_e0i, m.e0123, c_e0123, m.s, -c_e0123, m.e0i,
+                                   c_e012i, m.e03, c_e031i, m.e02, c_e023i, m.e01),
+                               q.e0123),
+              .e023i = all_e023i[0],
+              .e031i = all_e023i[1],
+              .e012i = all_e023i[2],
+              .e123i = mul_add(S(2),
+                               dot(-c_e1i, m.e23, -c_e1i, m.e023i, -c_e2i, m.e31, -c_e2i, m.e031i,
+                                   -c_e3i, m.e12, -c_e3i, m.e012i, -c_e12, m.e3i, -c_e31, m.e2i,
+                                   -c_e23, m.e1i, c_e0i, m.e123i, c_e123i, m.s, c_e123i, m.e0i,
+                                   -c_e012i, m.e3i, -c_e031i, m.e2i, -c_e023i, m.e1i),
+                               q.e123i)};
+    }
+  }
+  const S c_e012i = dot(-m.e23, q.e031i, m.e31, q.e023i, -m.e3i, q.e0123, m.e03, q.e123i);
+  const S c_e023i = dot(-m.e31, q.e012i, m.e12, q.e031i, -m.e1i, q.e0123, m.e01, q.e123i);
+  const S c_e031i = dot(-m.e12, q.e023i, m.e23, q.e012i, -m.e2i, q.e0123, m.e02, q.e123i);
   const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
   const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
+  const S c_e12 = dot(-m.e023i, q.e031i, m.e031i, q.e023i);
+  const S c_e23 = dot(-m.e031i, q.e012i, m.e012i, q.e031i);
+  const S c_e31 = dot(-m.e012i, q.e023i, m.e023i, q.e012i);
+  const S c_e01 = dot(m.e023i, q.e0123, -m.e0123, q.e023i);
+  const S c_e02 = dot(m.e031i, q.e0123, -m.e0123, q.e031i);
+  const S c_e03 = dot(m.e012i, q.e0123, -m.e0123, q.e012i);
+  const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
   const S c_e1i = dot(-m.e023i, q.e123i, m.e123i, q.e023i);
   const S c_e2i = dot(-m.e031i, q.e123i, m.e123i, q.e031i);
-  const S c_e012i = dot(-m.e23, q.e031i, m.e31, q.e023i, -m.e3i, q.e0123, m.e03, q.e123i);
   const S c_e3i = dot(-m.e012i, q.e123i, m.e123i, q.e012i);
-  const S c_e013i = dot(-m.e23, q.e012i, m.e12, q.e023i, m.e2i, q.e0123, -m.e02, q.e123i);
-  const S c_e023i = dot(-m.e31, q.e012i, m.e12, q.e031i, -m.e1i, q.e0123, m.e01, q.e123i);
-  const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
   return {.e0123 = mul_add(
               S(2),
               dot(-c_e01, m.e23, c_e01, m.e023i, -c_e02, m.e31, c_e02, m.e031i, -c_e03, m.e12,
-                  c_e03, m.e012i, -c_e12, m.e03, c_e13, m.e02, -c_e23, m.e01, -c_e0i, m.e0123,
-                  c_e0123, m.s, -c_e0123, m.e0i, c_e012i, m.e03, -c_e013i, m.e02, c_e023i, m.e01),
+                  c_e03, m.e012i, -c_e12, m.e03, -c_e31, m.e02, -c_e23, m.e01, -c_e0i, m.e0123,
+                  c_e0123, m.s, -c_e0123, m.e0i, c_e012i, m.e03, c_e031i, m.e02, c_e023i, m.e01),
               q.e0123),
           .e023i = mul_add(
               S(2),
-              dot(c_e12, m.e031i, c_e13, m.e012i, -c_e23, m.e0i, -c_e0i, m.e23, c_e01, m.e123i,
+              dot(c_e12, m.e031i, -c_e31, m.e012i, -c_e23, m.e0i, -c_e0i, m.e23, c_e01, m.e123i,
                   -c_e02, m.e3i, c_e03, m.e2i, -c_e1i, m.e0123, c_e2i, m.e03, -c_e3i, m.e02,
-                  -c_e012i, m.e31, -c_e013i, m.e12, c_e023i, m.s, -c_e0123, m.e1i, c_e123i, m.e01),
+                  -c_e012i, m.e31, c_e031i, m.e12, c_e023i, m.s, -c_e0123, m.e1i, c_e123i, m.e01),
               q.e023i),
           .e031i = mul_add(
               S(2),
-              dot(-c_e12, m.e023i, c_e13, m.e0i, c_e23, m.e012i, -c_e0i, m.e31, c_e01, m.e3i, c_e02,
-                  m.e123i, -c_e03, m.e1i, -c_e1i, m.e03, -c_e2i, m.e0123, c_e3i, m.e01, c_e012i,
-                  m.e23, -c_e013i, m.s, -c_e023i, m.e12, -c_e0123, m.e2i, c_e123i, m.e02),
+              dot(c_e23, m.e012i, -c_e12, m.e023i, -c_e31, m.e0i, -c_e0i, m.e31, c_e02, m.e123i,
+                  -c_e03, m.e1i, c_e01, m.e3i, -c_e2i, m.e0123, c_e3i, m.e01, -c_e1i, m.e03,
+                  -c_e023i, m.e12, c_e012i, m.e23, c_e031i, m.s, -c_e0123, m.e2i, c_e123i, m.e02),
               q.e031i),
           .e012i = mul_add(
               S(2),
-              dot(-c_e12, m.e0i, -c_e13, m.e023i, -c_e23, m.e031i, -c_e0i, m.e12, -c_e01, m.e2i,
-                  c_e02, m.e1i, c_e03, m.e123i, c_e1i, m.e02, -c_e2i, m.e01, -c_e3i, m.e0123,
-                  c_e012i, m.s, c_e013i, m.e23, c_e023i, m.e31, -c_e0123, m.e3i, c_e123i, m.e03),
+              dot(c_e31, m.e023i, -c_e23, m.e031i, -c_e12, m.e0i, -c_e0i, m.e12, c_e03, m.e123i,
+                  -c_e01, m.e2i, c_e02, m.e1i, -c_e3i, m.e0123, c_e1i, m.e02, -c_e2i, m.e01,
+                  -c_e031i, m.e23, c_e023i, m.e31, c_e012i, m.s, -c_e0123, m.e3i, c_e123i, m.e03),
               q.e012i),
           .e123i = mul_add(
               S(2),
               dot(-c_e1i, m.e23, -c_e1i, m.e023i, -c_e2i, m.e31, -c_e2i, m.e031i, -c_e3i, m.e12,
-                  -c_e3i, m.e012i, -c_e12, m.e3i, c_e13, m.e2i, -c_e23, m.e1i, c_e0i, m.e123i,
-                  c_e123i, m.s, c_e123i, m.e0i, -c_e012i, m.e3i, c_e013i, m.e2i, -c_e023i, m.e1i),
+                  -c_e3i, m.e012i, -c_e12, m.e3i, -c_e31, m.e2i, -c_e23, m.e1i, c_e0i, m.e123i,
+                  c_e123i, m.s, c_e123i, m.e0i, -c_e012i, m.e3i, -c_e031i, m.e2i, -c_e023i, m.e1i),
               q.e123i)};
 }
 
@@ -1248,21 +1907,79 @@ template <class S>
 /// Cost: 91 mul, 71 add (57 fused).
 template <class S>
 [[nodiscard]] constexpr Vector<S> sandwich(const Similarity<S>& m, const Vector<S>& v) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e012 = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
+      const S c_e0 = m.e0i * v.e0;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
+      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+                                  turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
+                                  -three_m_e1i, four(v.e0));
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
+      const S c_e123 = m.e123i * v.e0;
+      const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const S c_e023 = three_c_e012[1];
+      const S c_e013 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const auto all_e1 =
+          mul_add(four(S(2)),
+                  dot(four(c_e0), three_m_e1i, three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(three_c_e012), four(m.e123i), -four(c_e123), three_m_e23,
+                      three_c_e01i, four(m.e0i), turned<2, 3, 4, 2>(three_c_e01i),
+                      turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e01i),
+                      turned<2, 3, 4, 2>(three_m_e023i), three_c_e1, four(m.s),
+                      turned<2, 3, 4, 2>(three_c_e1), turned<3, 1, 2, 3>(three_m_e23),
+                      -turned<3, 1, 2, 3>(three_c_e1), turned<2, 3, 4, 2>(three_m_e23)),
+                  three_v_e1);
+      const S c_e3 = three_c_e1[2];
+      const S c_e2 = three_c_e1[1];
+      const S c_e1 = three_c_e1[0];
+      const S c_e03i = three_c_e01i[2];
+      const S c_e02i = three_c_e01i[1];
+      const S c_e01i = three_c_e01i[0];
+      const S c_e23i = three_c_e12i[1];
+      const S c_e31i = three_c_e12i[2];
+      const S c_e12i = three_c_e12i[0];
+      return {.e0 = mul_add(S(2),
+                            dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i, -c_e013,
+                                m.e31, c_e013, m.e031i, -c_e023, m.e23, c_e023, m.e023i),
+                            v.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = mul_add(
+                  S(2),
+                  dot(c_e12i, m.e12, c_e12i, m.e012i, c_e31i, m.e31, c_e31i, m.e031i, c_e23i, m.e23,
+                      c_e23i, m.e023i, c_e123, m.e123i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i,
+                      c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
+                  v.ei)};
+    }
+  }
+  const S c_e012 = m.e012i * v.e0;
+  const S c_e023 = m.e023i * v.e0;
+  const S c_e013 = m.e031i * v.e0;
   const S c_e0 = m.e0i * v.e0;
   const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0);
-  const S c_e2 = dot(m.e23, v.e3, -m.e12, v.e1, -m.e2i, v.e0);
-  const S c_e012 = m.e012i * v.e0;
+  const S c_e2 = dot(-m.e12, v.e1, m.e23, v.e3, -m.e2i, v.e0);
   const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0);
-  const S c_e013 = m.e031i * v.e0;
-  const S c_e023 = m.e023i * v.e0;
+  const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
+  const S c_e02i = dot(m.e012i, v.e1, -m.e023i, v.e3);
+  const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
   const S c_e123 = m.e123i * v.e0;
   const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
-  const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
-  const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
   const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
-  const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
   const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  const S c_e31i = dot(m.e031i, v.ei, -m.e123i, v.e2);
   return {.e0 = mul_add(S(2),
                         dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i, -c_e013,
                             m.e31, c_e013, m.e031i, -c_e023, m.e23, c_e023, m.e023i),
@@ -1273,18 +1990,18 @@ template <class S>
                             c_e2, m.e12, -c_e3, m.e31),
                         v.e1),
           .e2 = mul_add(S(2),
-                        dot(c_e0, m.e2i, -c_e012, m.e1i, c_e013, m.e123i, c_e023, m.e3i, -c_e123,
-                            m.e31, -c_e01i, m.e012i, c_e02i, m.e0i, c_e03i, m.e023i, -c_e1, m.e12,
-                            c_e2, m.s, c_e3, m.e23),
+                        dot(c_e0, m.e2i, c_e023, m.e3i, -c_e012, m.e1i, c_e013, m.e123i, -c_e123,
+                            m.e31, c_e02i, m.e0i, c_e03i, m.e023i, -c_e01i, m.e012i, c_e2, m.s,
+                            c_e3, m.e23, -c_e1, m.e12),
                         v.e2),
           .e3 = mul_add(S(2),
-                        dot(c_e0, m.e3i, c_e012, m.e123i, c_e013, m.e1i, -c_e023, m.e2i, -c_e123,
-                            m.e12, c_e01i, m.e031i, -c_e02i, m.e023i, c_e03i, m.e0i, c_e1, m.e31,
-                            -c_e2, m.e23, c_e3, m.s),
+                        dot(c_e0, m.e3i, c_e013, m.e1i, -c_e023, m.e2i, c_e012, m.e123i, -c_e123,
+                            m.e12, c_e03i, m.e0i, c_e01i, m.e031i, -c_e02i, m.e023i, c_e3, m.s,
+                            c_e1, m.e31, -c_e2, m.e23),
                         v.e3),
           .ei = mul_add(
               S(2),
-              dot(c_e12i, m.e12, c_e12i, m.e012i, -c_e13i, m.e31, -c_e13i, m.e031i, c_e23i, m.e23,
+              dot(c_e12i, m.e12, c_e12i, m.e012i, c_e31i, m.e31, c_e31i, m.e031i, c_e23i, m.e23,
                   c_e23i, m.e023i, c_e123, m.e123i, c_e01i, m.e1i, c_e02i, m.e2i, c_e03i, m.e3i,
                   c_ei, m.s, c_ei, m.e0i, -c_e1, m.e1i, -c_e2, m.e2i, -c_e3, m.e3i),
               v.ei)};
@@ -1297,81 +2014,169 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Similarity<S>& m,
                                              const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i);
-  const S c_e02 = dot(b.e03, m.e23, -b.e01, m.e12, -b.e02, m.e0i);
-  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i);
-  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i);
-  const S c_e13 = dot(-b.e12, m.e23, b.e23, m.e12, -b.e03, m.e1i, b.e01, m.e3i);
-  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i);
-  const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
+      const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_c_e01 = dot(-turned<3, 1, 2, 3>(three_b_e01),
+                                   turned<2, 3, 4, 2>(three_m_e23), turned<2, 3, 4, 2>(three_b_e01),
+                                   turned<3, 1, 2, 3>(three_m_e23), -three_b_e01, four(m.e0i));
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e012i =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i));
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
+              three_b_e01, turned<2, 3, 4, 2>(three_m_e1i));
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_c_e1i =
+          dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
+              four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e1i));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
+      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s - m.e0i;
+      const auto all_e23 = mul_add(
+          four(S(2)),
+          dot(-three_c_e12, turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e12), four(m.s),
+              three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
+              -three_c_e01, four(m.e123i), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e01),
+              turned<2, 3, 4, 2>(three_m_e1i), -four(c_e0123), three_m_e1i, -four(c_e0i),
+              three_m_e023i),
+          three_b_e23);
+      const auto all_e1i =
+          mul_add(four(S(2)),
+                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e0i),
+                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(three_m_plus_e12), three_c_e1i,
+                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_b_e1i);
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const S c_e023i = three_c_e012i[1];
+      const S c_e031i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const S c_e23 = three_c_e12[1];
+      const S c_e31 = three_c_e12[2];
+      const S c_e12 = three_c_e12[0];
+      const auto all_e01 = mul_add(
+          four(S(2)),
+          dot(three_c_e01, four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
+              turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12), four(c_e0123),
+              turned<2, 3, 4, 2>(three_m_minus_e12)),
+          three_b_e01);
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = mul_add(S(2),
+                             dot(-c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e012i, m.e12,
+                                 c_e031i, m.e31, c_e023i, m.e23, -c_e01, m.e1i, -c_e02, m.e2i,
+                                 -c_e03, m.e3i, c_e0123, m.e123i, -c_e0i, m.s),
+                             b.e0i),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
+  const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i);
+  const S c_e02 = dot(-b.e01, m.e12, b.e03, m.e23, -b.e02, m.e0i);
+  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i);
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i);
+  const S c_e031i = dot(-b.e23, m.e012i, b.e12, m.e023i, -b.e02, m.e123i);
+  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i);
+  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i);
+  const S c_e31 = dot(-b.e23, m.e12, b.e12, m.e23, -b.e01, m.e3i, b.e03, m.e1i);
   const S c_e1i =
       dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
-  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i);
+      dot(-b.e1i, m.e12, b.e3i, m.e23, b.e2i, m.e0i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e12, m.e1i);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
-  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i);
-  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i);
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e0i, m.e3i, -b.e31, m.e1i, b.e23, m.e2i);
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
   const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
   const S c_minus_e12 = c_e12 + c_e012i;
-  const S c_minus_e13 = c_e13 + c_e013i;
   const S c_minus_e23 = c_e23 + c_e023i;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
+  const S c_minus_e31 = c_e31 + c_e031i;
   const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S m_minus_s = m.s - m.e0i;
   return {
       .e23 = mul_add(S(2),
-                     dot(-c_e12, m.e31, -c_e13, m.e12, c_e23, m.s, c_e012i, m.e031i, c_e013i,
+                     dot(-c_e12, m.e31, c_e31, m.e12, c_e23, m.s, c_e012i, m.e031i, -c_e031i,
                          m.e012i, -c_e023i, m.e0i, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i,
                          -c_e0123, m.e1i, -c_e0i, m.e023i),
                      b.e23),
       .e31 = mul_add(S(2),
-                     dot(c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12, -c_e012i, m.e023i, c_e013i,
-                         m.e0i, c_e023i, m.e012i, -c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i,
+                     dot(-c_e23, m.e12, c_e12, m.e23, c_e31, m.s, c_e023i, m.e012i, -c_e012i,
+                         m.e023i, -c_e031i, m.e0i, -c_e02, m.e123i, c_e03, m.e1i, -c_e01, m.e3i,
                          -c_e0123, m.e2i, -c_e0i, m.e031i),
                      b.e31),
       .e12 = mul_add(S(2),
-                     dot(c_e12, m.s, c_e13, m.e23, c_e23, m.e31, -c_e012i, m.e0i, -c_e013i, m.e023i,
-                         -c_e023i, m.e031i, c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i, -c_e0123,
-                         m.e3i, -c_e0i, m.e012i),
+                     dot(-c_e31, m.e23, c_e23, m.e31, c_e12, m.s, c_e031i, m.e023i, -c_e023i,
+                         m.e031i, -c_e012i, m.e0i, -c_e03, m.e123i, c_e01, m.e2i, -c_e02, m.e1i,
+                         -c_e0123, m.e3i, -c_e0i, m.e012i),
                      b.e12),
       .e1i =
           mul_add(S(2),
-                  dot(-c_minus_e12, m.e2i, -c_minus_e13, m.e3i, -c_minus_e23, m.e123i, c_e0i, m.e1i,
+                  dot(-c_minus_e12, m.e2i, c_minus_e31, m.e3i, -c_minus_e23, m.e123i, c_e0i, m.e1i,
                       c_e123i, m_plus_e23, c_e1i, m_plus_s, c_e2i, m_plus_e12, -c_e3i, m_plus_e13),
                   b.e1i),
       .e2i =
           mul_add(S(2),
-                  dot(c_minus_e12, m.e1i, c_minus_e13, m.e123i, -c_minus_e23, m.e3i, c_e0i, m.e2i,
-                      c_e123i, m_plus_e13, -c_e1i, m_plus_e12, c_e2i, m_plus_s, c_e3i, m_plus_e23),
+                  dot(-c_minus_e23, m.e3i, c_minus_e12, m.e1i, -c_minus_e31, m.e123i, c_e0i, m.e2i,
+                      c_e123i, m_plus_e13, c_e2i, m_plus_s, c_e3i, m_plus_e23, -c_e1i, m_plus_e12),
                   b.e2i),
       .e3i =
           mul_add(S(2),
-                  dot(-c_minus_e12, m.e123i, c_minus_e13, m.e1i, c_minus_e23, m.e2i, c_e0i, m.e3i,
-                      c_e123i, m_plus_e12, c_e1i, m_plus_e13, -c_e2i, m_plus_e23, c_e3i, m_plus_s),
+                  dot(-c_minus_e31, m.e1i, c_minus_e23, m.e2i, -c_minus_e12, m.e123i, c_e0i, m.e3i,
+                      c_e123i, m_plus_e12, c_e3i, m_plus_s, c_e1i, m_plus_e13, -c_e2i, m_plus_e23),
                   b.e3i),
       .e0i = mul_add(S(2),
-                     dot(-c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e012i, m.e12, -c_e013i,
+                     dot(-c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e012i, m.e12, c_e031i,
                          m.e31, c_e023i, m.e23, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03, m.e3i,
                          c_e0123, m.e123i, -c_e0i, m.s),
                      b.e0i),
       .e01 = mul_add(
           S(2),
-          dot(c_e01, m_minus_s, -c_e02, m_minus_e12, -c_e03, m_minus_e13, c_e0123, m_minus_e23),
+          dot(c_e01, m_minus_s, -c_e02, m_minus_e12, c_e03, m_minus_e31, c_e0123, m_minus_e23),
           b.e01),
       .e02 = mul_add(
           S(2),
-          dot(c_e01, m_minus_e12, c_e02, m_minus_s, -c_e03, m_minus_e23, -c_e0123, m_minus_e13),
+          dot(c_e02, m_minus_s, -c_e03, m_minus_e23, c_e01, m_minus_e12, c_e0123, m_minus_e31),
           b.e02),
       .e03 = mul_add(
-          S(2), dot(c_e01, m_minus_e13, c_e02, m_minus_e23, c_e03, m_minus_s, c_e0123, m_minus_e12),
+          S(2),
+          dot(c_e03, m_minus_s, -c_e01, m_minus_e31, c_e02, m_minus_e23, c_e0123, m_minus_e12),
           b.e03)};
 }
 
@@ -1406,50 +2211,117 @@ template <class S>
 /// Cost: 114 mul, 93 add (74 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich(const Motor<S>& m, const Bivector<S>& b) noexcept {
-  const S twice_e23 = S(2) * m.e23;
-  const S twice_e31 = S(2) * m.e31;
-  const S twice_e12 = S(2) * m.e12;
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_b_e01),
+              three_twice_e1i, three_b_e01, turned<2, 3, 4, 2>(three_twice_e1i));
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23));
+      const S twice_e3i = three_twice_e1i[2];
+      const S twice_e2i = three_twice_e1i[1];
+      const S twice_e1i = three_twice_e1i[0];
+      const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_c_e1i = dot(
+          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_twice_e23),
+          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_twice_e23), -four(b.e0i),
+          three_twice_e1i, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e1i),
+          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e1i));
+      const S twice_e123i = S(2) * m.e123i;
+      const auto three_c_e012i = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
+      const S c_e123i = b.e0i * twice_e123i;
+      const auto all_e23 =
+          dot(three_b_e23, -three_c_e01, four(m.e123i), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e01),
+              turned<2, 3, 4, 2>(three_m_e1i), -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+              turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto all_e1i =
+          dot(three_b_e1i, -four(c_e123i), three_m_e23, three_c_e012i,
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e123i),
+              -three_c_e12, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e12), four(m.e123i),
+              three_c_e1i, four(m.s), turned<2, 3, 4, 2>(three_c_e1i),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1i),
+              turned<2, 3, 4, 2>(three_m_e23), four(c_e0i), three_m_e1i);
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const S c_e023i = three_c_e012i[1];
+      const S c_e013i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const auto all_e01 = dot(three_b_e01, three_c_e01, four(m.s), turned<2, 3, 4, 2>(three_c_e01),
+                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01),
+                               turned<2, 3, 4, 2>(three_m_e23));
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = dot(b.e0i, -c_e012i, m.e12, -c_e013i, m.e31, -c_e023i, m.e23, -c_e01, m.e1i,
+                         -c_e02, m.e2i, -c_e03, m.e3i, -c_e0i, m.s),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S twice_e1i = S(2) * m.e1i;
   const S twice_e2i = S(2) * m.e2i;
   const S twice_e3i = S(2) * m.e3i;
-  const S twice_e123i = S(2) * m.e123i;
-  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
-  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12);
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
   const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31, -b.e02, twice_e1i, b.e01, twice_e2i);
-  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
-  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12, -b.e03, twice_e1i, b.e01, twice_e3i);
   const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12, -b.e03, twice_e2i, b.e02, twice_e3i);
+  const S c_e31 = dot(-b.e23, twice_e12, b.e12, twice_e23, -b.e01, twice_e3i, b.e03, twice_e1i);
+  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
+  const S c_e02 = dot(-b.e01, twice_e12, b.e03, twice_e23);
+  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
   const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
   const S c_e1i = dot(-b.e3i, twice_e31, b.e2i, twice_e12, -b.e0i, twice_e1i, -b.e12, twice_e2i,
                       b.e31, twice_e3i);
-  const S c_e2i = dot(b.e3i, twice_e23, -b.e1i, twice_e12, b.e12, twice_e1i, -b.e0i, twice_e2i,
-                      -b.e23, twice_e3i);
+  const S c_e2i = dot(-b.e1i, twice_e12, b.e3i, twice_e23, -b.e0i, twice_e2i, -b.e23, twice_e3i,
+                      b.e12, twice_e1i);
+  const S c_e3i = dot(-b.e2i, twice_e23, b.e1i, twice_e31, -b.e0i, twice_e3i, -b.e31, twice_e1i,
+                      b.e23, twice_e2i);
+  const S twice_e123i = S(2) * m.e123i;
   const S c_e012i = b.e03 * twice_e123i;
-  const S c_e3i = dot(-b.e2i, twice_e23, b.e1i, twice_e31, -b.e31, twice_e1i, b.e23, twice_e2i,
-                      -b.e0i, twice_e3i);
-  const S c_e013i = b.e02 * twice_e123i;
   const S c_e023i = b.e01 * twice_e123i;
+  const S c_e013i = b.e02 * twice_e123i;
   const S c_e123i = b.e0i * twice_e123i;
-  return {.e23 = dot(b.e23, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i, -c_e12, m.e31, -c_e13,
+  return {.e23 = dot(b.e23, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i, -c_e12, m.e31, c_e31,
                      m.e12, c_e23, m.s),
-          .e31 = dot(b.e31, -c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i, c_e12, m.e23, -c_e13, m.s,
-                     -c_e23, m.e12),
-          .e12 = dot(b.e12, c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i, c_e12, m.s, c_e13, m.e23,
-                     c_e23, m.e31),
+          .e31 = dot(b.e31, -c_e02, m.e123i, c_e03, m.e1i, -c_e01, m.e3i, -c_e23, m.e12, c_e12,
+                     m.e23, c_e31, m.s),
+          .e12 = dot(b.e12, -c_e03, m.e123i, c_e01, m.e2i, -c_e02, m.e1i, -c_e31, m.e23, c_e23,
+                     m.e31, c_e12, m.s),
           .e1i = dot(b.e1i, -c_e123i, m.e23, c_e012i, m.e2i, -c_e013i, m.e3i, c_e023i, m.e123i,
-                     -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12,
-                     -c_e3i, m.e31, c_e0i, m.e1i),
-          .e2i = dot(b.e2i, -c_e123i, m.e31, -c_e012i, m.e1i, c_e013i, m.e123i, c_e023i, m.e3i,
-                     c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s, c_e3i,
-                     m.e23, c_e0i, m.e2i),
-          .e3i = dot(b.e3i, -c_e123i, m.e12, c_e012i, m.e123i, c_e013i, m.e1i, -c_e023i, m.e2i,
-                     -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i, m.e23,
-                     c_e3i, m.s, c_e0i, m.e3i),
+                     -c_e12, m.e2i, c_e31, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12, -c_e3i,
+                     m.e31, c_e0i, m.e1i),
+          .e2i = dot(b.e2i, -c_e123i, m.e31, c_e023i, m.e3i, -c_e012i, m.e1i, c_e013i, m.e123i,
+                     -c_e23, m.e3i, c_e12, m.e1i, -c_e31, m.e123i, c_e2i, m.s, c_e3i, m.e23, -c_e1i,
+                     m.e12, c_e0i, m.e2i),
+          .e3i = dot(b.e3i, -c_e123i, m.e12, c_e013i, m.e1i, -c_e023i, m.e2i, c_e012i, m.e123i,
+                     -c_e31, m.e1i, c_e23, m.e2i, -c_e12, m.e123i, c_e3i, m.s, c_e1i, m.e31, -c_e2i,
+                     m.e23, c_e0i, m.e3i),
           .e0i = dot(b.e0i, -c_e012i, m.e12, -c_e013i, m.e31, -c_e023i, m.e23, -c_e01, m.e1i,
                      -c_e02, m.e2i, -c_e03, m.e3i, -c_e0i, m.s),
           .e01 = dot(b.e01, c_e01, m.s, c_e02, m.e12, -c_e03, m.e31),
-          .e02 = dot(b.e02, -c_e01, m.e12, c_e02, m.s, c_e03, m.e23),
-          .e03 = dot(b.e03, c_e01, m.e31, -c_e02, m.e23, c_e03, m.s)};
+          .e02 = dot(b.e02, c_e02, m.s, c_e03, m.e23, -c_e01, m.e12),
+          .e03 = dot(b.e03, c_e03, m.s, c_e01, m.e31, -c_e02, m.e23)};
 }
 
 /// sandwich: Motor Point -> Point
@@ -1498,27 +2370,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Line<S> sandwich(const Motor<S>& m,
                                                         const Line<S>& l) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_l_e23 = four(l.e23, l.e31, l.e12, l.e23);
+      const auto three_c_e12 = dot(-turned<2, 3, 4, 2>(three_l_e23), three_twice_e23, three_l_e23,
+                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto three_l_e1i = four(l.e1i, l.e2i, l.e3i, l.e1i);
+      const auto three_c_e1i =
+          dot(-turned<3, 1, 2, 3>(three_l_e1i), turned<2, 3, 4, 2>(three_twice_e23),
+              turned<2, 3, 4, 2>(three_l_e1i), turned<3, 1, 2, 3>(three_twice_e23),
+              -turned<3, 1, 2, 3>(three_l_e23), turned<2, 3, 4, 2>(three_twice_e1i),
+              turned<2, 3, 4, 2>(three_l_e23), turned<3, 1, 2, 3>(three_twice_e1i));
+      const auto all_e23 = dot(three_l_e23, -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+                               turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+                               turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto all_e1i =
+          dot(three_l_e1i, -three_c_e12, turned<2, 3, 4, 2>(three_m_e1i),
+              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e1i),
+              -turned<2, 3, 4, 2>(three_c_e12), four(m.e123i), three_c_e1i, four(m.s),
+              turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e23),
+              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e23));
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2]};
+    }
+  }
   const S twice_e23 = S(2) * m.e23;
   const S twice_e31 = S(2) * m.e31;
   const S twice_e12 = S(2) * m.e12;
+  const S c_e12 = dot(-l.e31, twice_e23, l.e23, twice_e31);
+  const S c_e23 = dot(-l.e12, twice_e31, l.e31, twice_e12);
+  const S c_e31 = dot(-l.e23, twice_e12, l.e12, twice_e23);
   const S twice_e1i = S(2) * m.e1i;
   const S twice_e2i = S(2) * m.e2i;
   const S twice_e3i = S(2) * m.e3i;
-  const S c_e12 = dot(-l.e31, twice_e23, l.e23, twice_e31);
-  const S c_e13 = dot(-l.e12, twice_e23, l.e23, twice_e12);
-  const S c_e23 = dot(-l.e12, twice_e31, l.e31, twice_e12);
   const S c_e1i = dot(-l.e3i, twice_e31, l.e2i, twice_e12, -l.e12, twice_e2i, l.e31, twice_e3i);
-  const S c_e2i = dot(l.e3i, twice_e23, -l.e1i, twice_e12, l.e12, twice_e1i, -l.e23, twice_e3i);
+  const S c_e2i = dot(-l.e1i, twice_e12, l.e3i, twice_e23, -l.e23, twice_e3i, l.e12, twice_e1i);
   const S c_e3i = dot(-l.e2i, twice_e23, l.e1i, twice_e31, -l.e31, twice_e1i, l.e23, twice_e2i);
-  return {.e23 = dot(l.e23, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s),
-          .e31 = dot(l.e31, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12),
-          .e12 = dot(l.e12, c_e12, m.s, c_e13, m.e23, c_e23, m.e31),
-          .e1i = dot(l.e1i, -c_e12, m.e2i, -c_e13, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12,
+  return {.e23 = dot(l.e23, -c_e12, m.e31, c_e31, m.e12, c_e23, m.s),
+          .e31 = dot(l.e31, -c_e23, m.e12, c_e12, m.e23, c_e31, m.s),
+          .e12 = dot(l.e12, -c_e31, m.e23, c_e23, m.e31, c_e12, m.s),
+          .e1i = dot(l.e1i, -c_e12, m.e2i, c_e31, m.e3i, -c_e23, m.e123i, c_e1i, m.s, c_e2i, m.e12,
                      -c_e3i, m.e31),
-          .e2i = dot(l.e2i, c_e12, m.e1i, c_e13, m.e123i, -c_e23, m.e3i, -c_e1i, m.e12, c_e2i, m.s,
-                     c_e3i, m.e23),
-          .e3i = dot(l.e3i, -c_e12, m.e123i, c_e13, m.e1i, c_e23, m.e2i, c_e1i, m.e31, -c_e2i,
-                     m.e23, c_e3i, m.s)};
+          .e2i = dot(l.e2i, -c_e23, m.e3i, c_e12, m.e1i, -c_e31, m.e123i, c_e2i, m.s, c_e3i, m.e23,
+                     -c_e1i, m.e12),
+          .e3i = dot(l.e3i, -c_e31, m.e1i, c_e23, m.e2i, -c_e12, m.e123i, c_e3i, m.s, c_e1i, m.e31,
+                     -c_e2i, m.e23)};
 }
 
 /// sandwich: Rotor Vector -> Vector
@@ -1566,59 +2472,132 @@ template <class S>
 /// Cost: 88 mul, 79 add (52 fused).
 template <class S>
 [[nodiscard]] constexpr Vector<S> sandwich_lean(const Versor<S>& m, const Vector<S>& v) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
+      const auto three_c_e012 = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+                                  turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
+                                  -three_m_e1i, four(v.e0), three_m_e01, four(v.ei));
+      const auto three_c_plus_e1 = three_c_e01i + three_c_e1;
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const auto three_c_minus_e1 = -three_c_e01i + three_c_e1;
+      const S c_e023 = three_c_e012[1];
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S c_e031 = three_c_e012[2];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S c_e012 = three_c_e012[0];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const S c_plus_e3 = three_c_plus_e1[2];
+      const S c_plus_e2 = three_c_plus_e1[1];
+      const S c_plus_e1 = three_c_plus_e1[0];
+      const auto all_e1 = mul_add(
+          four(S(2)),
+          dot(three_c_plus_e1, four(m_plus_s), turned<2, 3, 4, 2>(three_c_plus_e1),
+              three_m_plus_e12, -turned<3, 1, 2, 3>(three_c_plus_e1),
+              turned<3, 1, 2, 3>(three_m_plus_e12), four(c_e123),
+              turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
+              dot(-three_c_e012, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
+                  turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
+                  -four(c_e0), three_m_e1i)),
+          three_v_e1);
+      const S c_e23i = three_c_e12i[1];
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S c_e31i = three_c_e12i[2];
+      const S m_plus_e13 = three_m_plus_e12[2];
+      const S c_e12i = three_c_e12i[0];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S c_minus_e3 = three_c_minus_e1[2];
+      const S c_minus_e2 = three_c_minus_e1[1];
+      const S c_minus_e1 = three_c_minus_e1[0];
+      return {.e0 = mul_add(S(2),
+                            dot(c_plus_e1, m.e01, c_plus_e2, m.e02, c_plus_e3, m.e03, c_e123,
+                                m.e0123, -c_e012, m_minus_e12, -c_e031, m_minus_e31, -c_e023,
+                                m_minus_e23, c_e0, m_minus_s),
+                            v.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = mul_add(
+                  S(2),
+                  dot(-c_minus_e1, m.e1i, -c_minus_e2, m.e2i, -c_minus_e3, m.e3i, -c_e123, m.e123i,
+                      c_e12i, m_plus_e12, c_e31i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
+                  v.ei)};
+    }
+  }
   const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
-  const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0, m.e01, v.ei);
-  const S c_e2 = dot(m.e23, v.e3, -m.e12, v.e1, -m.e2i, v.e0, m.e02, v.ei);
-  const S c_e012 = dot(-m.e012i, v.e0, m.e0123, v.e3);
-  const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0, m.e03, v.ei);
-  const S c_e013 = dot(m.e031i, v.e0, -m.e0123, v.e2);
-  const S c_e023 = dot(-m.e023i, v.e0, m.e0123, v.e1);
-  const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
-  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
-  const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
-  const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
-  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
-  const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
-  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
-  const S c_plus_e1 = c_e01i + c_e1;
-  const S c_minus_e1 = -c_e01i + c_e1;
-  const S c_plus_e2 = c_e02i + c_e2;
-  const S c_minus_e2 = -c_e02i + c_e2;
-  const S c_plus_e3 = c_e03i + c_e3;
-  const S c_minus_e3 = -c_e03i + c_e3;
-  const S m_plus_s = m.s + m.e0i;
   const S m_minus_s = m.s - m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
+  const S c_e012 = dot(-m.e012i, v.e0, m.e0123, v.e3);
+  const S c_e023 = dot(-m.e023i, v.e0, m.e0123, v.e1);
+  const S c_e031 = dot(-m.e031i, v.e0, m.e0123, v.e2);
   const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
+  const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
+  const S c_e02i = dot(m.e012i, v.e1, -m.e023i, v.e3);
+  const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
+  const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0, m.e01, v.ei);
+  const S c_e2 = dot(-m.e12, v.e1, m.e23, v.e3, -m.e2i, v.e0, m.e02, v.ei);
+  const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0, m.e03, v.ei);
+  const S c_plus_e1 = c_e01i + c_e1;
+  const S c_plus_e2 = c_e02i + c_e2;
+  const S c_plus_e3 = c_e03i + c_e3;
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
+  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  const S c_e31i = dot(m.e031i, v.ei, -m.e123i, v.e2);
+  const S c_minus_e1 = -c_e01i + c_e1;
+  const S c_minus_e2 = -c_e02i + c_e2;
+  const S c_minus_e3 = -c_e03i + c_e3;
   return {.e0 = mul_add(
               S(2),
               dot(c_plus_e1, m.e01, c_plus_e2, m.e02, c_plus_e3, m.e03, c_e123, m.e0123, -c_e012,
-                  m_minus_e12, -c_e013, m_minus_e13, -c_e023, m_minus_e23, c_e0, m_minus_s),
+                  m_minus_e12, -c_e031, m_minus_e31, -c_e023, m_minus_e23, c_e0, m_minus_s),
               v.e0),
           .e1 = mul_add(S(2),
                         dot(c_plus_e1, m_plus_s, c_plus_e2, m_plus_e12, -c_plus_e3, m_plus_e13,
                             c_e123, m_plus_e23, S(2),
-                            dot(-c_e012, m.e2i, -c_e013, m.e3i, -c_e023, m.e123i, -c_e0, m.e1i)),
+                            dot(-c_e012, m.e2i, c_e031, m.e3i, -c_e023, m.e123i, -c_e0, m.e1i)),
                         v.e1),
           .e2 = mul_add(S(2),
-                        dot(-c_plus_e1, m_plus_e12, c_plus_e2, m_plus_s, c_plus_e3, m_plus_e23,
+                        dot(c_plus_e2, m_plus_s, c_plus_e3, m_plus_e23, -c_plus_e1, m_plus_e12,
                             c_e123, m_plus_e13, S(2),
-                            dot(c_e012, m.e1i, c_e013, m.e123i, -c_e023, m.e3i, -c_e0, m.e2i)),
+                            dot(-c_e023, m.e3i, c_e012, m.e1i, -c_e031, m.e123i, -c_e0, m.e2i)),
                         v.e2),
           .e3 = mul_add(S(2),
-                        dot(c_plus_e1, m_plus_e13, -c_plus_e2, m_plus_e23, c_plus_e3, m_plus_s,
+                        dot(c_plus_e3, m_plus_s, c_plus_e1, m_plus_e13, -c_plus_e2, m_plus_e23,
                             c_e123, m_plus_e12, S(2),
-                            dot(-c_e012, m.e123i, c_e013, m.e1i, c_e023, m.e2i, -c_e0, m.e3i)),
+                            dot(-c_e031, m.e1i, c_e023, m.e2i, -c_e012, m.e123i, -c_e0, m.e3i)),
                         v.e3),
           .ei = mul_add(
               S(2),
               dot(-c_minus_e1, m.e1i, -c_minus_e2, m.e2i, -c_minus_e3, m.e3i, -c_e123, m.e123i,
-                  c_e12i, m_plus_e12, -c_e13i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
+                  c_e12i, m_plus_e12, c_e31i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
               v.ei)};
 }
 
@@ -1627,99 +2606,196 @@ template <class S>
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
 /// Lean: error at most 3 ulp of the terms of all components together.
 /// A component that is small beside the others, or 0, may be rounding alone.
-/// Cost: 174 mul, 159 add (116 fused).
+/// Cost: 174 mul, 159 add (115 fused).
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich_lean(const Versor<S>& m,
                                                   const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e23), -three_b_e01,
+              four(m.e0i), four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e01), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e01));
+      const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const S c_e0i = lanes::total(dot(-three_b_e01, three_m_e1i, three_b_e1i, three_m_e01));
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_c_e012i =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i),
+              turned<3, 1, 2, 3>(three_b_e1i), four(m.e0123));
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
+              three_b_e01, turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_b_e1i),
+              three_m_e01, three_b_e1i, turned<2, 3, 4, 2>(three_m_e01));
+      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_c_e1i =
+          dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
+              four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e1i));
+      const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
+      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s - m.e0i;
+      const auto all_e23 =
+          mul_add(four(S(2)),
+                  dot(-three_c_plus_e12, turned<3, 1, 2, 3>(three_m_plus_e12),
+                      turned<3, 1, 2, 3>(three_c_plus_e12), three_m_plus_e12,
+                      turned<2, 3, 4, 2>(three_c_plus_e12), four(m_plus_s), four(c_e0i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
+                      dot(four(c_e0123), three_m_e1i, -three_c_e01, four(m.e123i),
+                          turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
+                          -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i))),
+                  three_b_e23);
+      const auto all_e1i =
+          mul_add(four(S(2)),
+                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), -four(c_e0i), three_m_e1i, three_c_e1i,
+                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_b_e1i);
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const S c_plus_e23 = three_c_plus_e12[1];
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S c_plus_e31 = three_c_plus_e12[2];
+      const S m_plus_e13 = three_m_plus_e12[2];
+      const S c_plus_e12 = three_c_plus_e12[0];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const auto all_e01 =
+          mul_add(four(S(2)),
+                  dot(-three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
+                      turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
+                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), -four(c_e0123),
+                      turned<2, 3, 4, 2>(three_m_minus_e12), four(c_e0i), three_m_e01, three_c_e01,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
+                      turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  three_b_e01);
+      return {
+          .e23 = all_e23[0],
+          .e31 = all_e23[1],
+          .e12 = all_e23[2],
+          .e1i = all_e1i[0],
+          .e2i = all_e1i[1],
+          .e3i = all_e1i[2],
+          .e0i = mul_add(S(2),
+                         dot(-c_plus_e12, m_plus_e12, -c_plus_e31, m_plus_e13, -c_plus_e23,
+                             m_plus_e23, c_e0i, m_plus_s, S(2),
+                             dot(-c_e0123, m.e123i, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03, m.e3i)),
+                         b.e0i),
+          .e01 = all_e01[0],
+          .e02 = all_e01[1],
+          .e03 = all_e01[2]};
+    }
+  }
   const S c_e01 =
       dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i, b.e0i, m.e01, -b.e12, m.e02, b.e31, m.e03);
   const S c_e02 =
-      dot(b.e03, m.e23, -b.e01, m.e12, -b.e02, m.e0i, b.e12, m.e01, b.e0i, m.e02, -b.e23, m.e03);
+      dot(-b.e01, m.e12, b.e03, m.e23, -b.e02, m.e0i, b.e0i, m.e02, -b.e23, m.e03, b.e12, m.e01);
+  const S c_e03 =
+      dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i, b.e0i, m.e03, -b.e31, m.e01, b.e23, m.e02);
+  const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
+  const S c_e0i = dot(-b.e01, m.e1i, b.e1i, m.e01) + dot(-b.e02, m.e2i, b.e2i, m.e02) +
+                  dot(-b.e03, m.e3i, b.e3i, m.e03);
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i, b.e3i, m.e0123);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i, b.e1i, m.e0123);
+  const S c_e031i = dot(-b.e23, m.e012i, b.e12, m.e023i, -b.e02, m.e123i, b.e2i, m.e0123);
   const S c_e12 =
       dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i, -b.e2i, m.e01, b.e1i, m.e02);
-  const S c_e03 =
-      dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i, -b.e31, m.e01, b.e23, m.e02, b.e0i, m.e03);
-  const S c_e13 =
-      dot(-b.e12, m.e23, b.e23, m.e12, -b.e03, m.e1i, b.e01, m.e3i, -b.e3i, m.e01, b.e1i, m.e03);
   const S c_e23 =
       dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i, -b.e3i, m.e02, b.e2i, m.e03);
-  const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
-  const S c_e0i =
-      dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, b.e1i, m.e01, b.e2i, m.e02, b.e3i, m.e03);
+  const S c_e31 =
+      dot(-b.e23, m.e12, b.e12, m.e23, -b.e01, m.e3i, b.e03, m.e1i, -b.e1i, m.e03, b.e3i, m.e01);
+  const S c_plus_e12 = -c_e012i + c_e12;
+  const S c_plus_e23 = -c_e023i + c_e23;
+  const S c_plus_e31 = -c_e031i + c_e31;
+  const S m_plus_s = m.s + m.e0i;
   const S c_e1i =
       dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
-  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i, b.e3i, m.e0123);
+      dot(-b.e1i, m.e12, b.e3i, m.e23, b.e2i, m.e0i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e12, m.e1i);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
-  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i, -b.e2i, m.e0123);
-  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i, b.e1i, m.e0123);
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e0i, m.e3i, -b.e31, m.e1i, b.e23, m.e2i);
   const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
-  const S c_plus_e12 = -c_e012i + c_e12;
   const S c_minus_e12 = c_e012i + c_e12;
-  const S c_plus_e13 = -c_e013i + c_e13;
-  const S c_minus_e13 = c_e013i + c_e13;
-  const S c_plus_e23 = -c_e023i + c_e23;
   const S c_minus_e23 = c_e023i + c_e23;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
+  const S c_minus_e31 = c_e031i + c_e31;
   const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S m_minus_s = m.s - m.e0i;
   return {.e23 = mul_add(S(2),
-                         dot(-c_plus_e12, m_plus_e13, -c_plus_e13, m_plus_e12, c_plus_e23, m_plus_s,
+                         dot(-c_plus_e12, m_plus_e13, c_plus_e31, m_plus_e12, c_plus_e23, m_plus_s,
                              c_e0i, m_plus_e23, S(2),
                              dot(c_e0123, m.e1i, -c_e01, m.e123i, c_e02, m.e3i, -c_e03, m.e2i)),
                          b.e23),
           .e31 = mul_add(S(2),
-                         dot(c_plus_e12, m_plus_e23, -c_plus_e13, m_plus_s, -c_plus_e23, m_plus_e12,
+                         dot(-c_plus_e23, m_plus_e12, c_plus_e12, m_plus_e23, c_plus_e31, m_plus_s,
                              c_e0i, m_plus_e13, S(2),
-                             dot(c_e0123, m.e2i, -c_e01, m.e3i, -c_e02, m.e123i, c_e03, m.e1i)),
+                             dot(c_e0123, m.e2i, -c_e02, m.e123i, c_e03, m.e1i, -c_e01, m.e3i)),
                          b.e31),
           .e12 = mul_add(S(2),
-                         dot(c_plus_e12, m_plus_s, c_plus_e13, m_plus_e23, c_plus_e23, m_plus_e13,
+                         dot(-c_plus_e31, m_plus_e23, c_plus_e23, m_plus_e13, c_plus_e12, m_plus_s,
                              c_e0i, m_plus_e12, S(2),
-                             dot(c_e0123, m.e3i, c_e01, m.e2i, -c_e02, m.e1i, -c_e03, m.e123i)),
+                             dot(c_e0123, m.e3i, -c_e03, m.e123i, c_e01, m.e2i, -c_e02, m.e1i)),
                          b.e12),
           .e1i = mul_add(S(2),
-                         dot(-c_minus_e12, m.e2i, -c_minus_e13, m.e3i, -c_minus_e23, m.e123i,
+                         dot(-c_minus_e12, m.e2i, c_minus_e31, m.e3i, -c_minus_e23, m.e123i,
                              c_e123i, m_plus_e23, -c_e0i, m.e1i, c_e1i, m_plus_s, c_e2i, m_plus_e12,
                              -c_e3i, m_plus_e13),
                          b.e1i),
           .e2i = mul_add(S(2),
-                         dot(c_minus_e12, m.e1i, c_minus_e13, m.e123i, -c_minus_e23, m.e3i, c_e123i,
-                             m_plus_e13, -c_e0i, m.e2i, -c_e1i, m_plus_e12, c_e2i, m_plus_s, c_e3i,
-                             m_plus_e23),
+                         dot(-c_minus_e23, m.e3i, c_minus_e12, m.e1i, -c_minus_e31, m.e123i,
+                             c_e123i, m_plus_e13, -c_e0i, m.e2i, c_e2i, m_plus_s, c_e3i, m_plus_e23,
+                             -c_e1i, m_plus_e12),
                          b.e2i),
           .e3i = mul_add(S(2),
-                         dot(-c_minus_e12, m.e123i, c_minus_e13, m.e1i, c_minus_e23, m.e2i, c_e123i,
-                             m_plus_e12, -c_e0i, m.e3i, c_e1i, m_plus_e13, -c_e2i, m_plus_e23,
-                             c_e3i, m_plus_s),
+                         dot(-c_minus_e31, m.e1i, c_minus_e23, m.e2i, -c_minus_e12, m.e123i,
+                             c_e123i, m_plus_e12, -c_e0i, m.e3i, c_e3i, m_plus_s, c_e1i, m_plus_e13,
+                             -c_e2i, m_plus_e23),
                          b.e3i),
           .e0i = mul_add(S(2),
-                         dot(-c_plus_e12, m_plus_e12, c_plus_e13, m_plus_e13, -c_plus_e23,
+                         dot(-c_plus_e12, m_plus_e12, -c_plus_e31, m_plus_e13, -c_plus_e23,
                              m_plus_e23, c_e0i, m_plus_s, S(2),
                              dot(-c_e0123, m.e123i, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03, m.e3i)),
                          b.e0i),
           .e01 = mul_add(S(2),
-                         dot(-c_plus_e12, m.e02, -c_plus_e13, m.e03, -c_plus_e23, m.e0123, -c_e0123,
+                         dot(-c_plus_e12, m.e02, c_plus_e31, m.e03, -c_plus_e23, m.e0123, -c_e0123,
                              m_minus_e23, c_e0i, m.e01, c_e01, m_minus_s, -c_e02, m_minus_e12,
-                             -c_e03, m_minus_e13),
+                             c_e03, m_minus_e31),
                          b.e01),
-          .e02 = mul_add(
-              S(2),
-              dot(c_plus_e12, m.e01, c_plus_e13, m.e0123, -c_plus_e23, m.e03, c_e0123, m_minus_e13,
-                  c_e0i, m.e02, c_e01, m_minus_e12, c_e02, m_minus_s, -c_e03, m_minus_e23),
-              b.e02),
-          .e03 = mul_add(
-              S(2),
-              dot(-c_plus_e12, m.e0123, c_plus_e13, m.e01, c_plus_e23, m.e02, -c_e0123, m_minus_e12,
-                  c_e0i, m.e03, c_e01, m_minus_e13, c_e02, m_minus_e23, c_e03, m_minus_s),
-              b.e03)};
+          .e02 = mul_add(S(2),
+                         dot(-c_plus_e23, m.e03, c_plus_e12, m.e01, -c_plus_e31, m.e0123, -c_e0123,
+                             m_minus_e31, c_e0i, m.e02, c_e02, m_minus_s, -c_e03, m_minus_e23,
+                             c_e01, m_minus_e12),
+                         b.e02),
+          .e03 = mul_add(S(2),
+                         dot(-c_plus_e31, m.e01, c_plus_e23, m.e02, -c_plus_e12, m.e0123, -c_e0123,
+                             m_minus_e12, c_e0i, m.e03, c_e03, m_minus_s, -c_e01, m_minus_e31,
+                             c_e02, m_minus_e23),
+                         b.e03)};
 }
 
 /// sandwich_lean: Versor Trivector -> Trivector
@@ -1727,99 +2803,196 @@ template <class S>
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
 /// Lean: error at most 3 ulp of the terms of all components together.
 /// A component that is small beside the others, or 0, may be rounding alone.
-/// Cost: 174 mul, 159 add (116 fused).
+/// Cost: 174 mul, 159 add (115 fused).
 template <class S>
 [[nodiscard]] constexpr Trivector<S> sandwich_lean(const Versor<S>& m,
                                                    const Trivector<S>& t) noexcept {
-  const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
-  const S c_e1 = dot(m.e031i, t.e03i, -m.e012i, t.e02i, m.e123i, t.e023, -m.e0123, t.e23i);
-  const S c_e2 = dot(-m.e023i, t.e03i, m.e012i, t.e01i, m.e123i, t.e031, -m.e0123, t.e31i);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
+      const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
+      const auto three_c_e012 =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e023), turned<2, 3, 4, 2>(three_m_e23),
+              three_t_e023, -four(m.e0i), turned<3, 1, 2, 3>(three_t_e023), -three_m_e01,
+              turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e01), three_t_e01i,
+              turned<3, 1, 2, 3>(three_m_e01), four(t.e123));
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
+      const S c_e123 = lanes::total(dot(-three_m_e1i, three_t_e023, three_m_e01, three_t_e23i));
+      const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
+      const auto three_c_e1 =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_t_e01i),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_t_e01i), four(m.e123i),
+              three_t_e023, -four(m.e0123), three_t_e23i);
+      const auto three_c_e01i =
+          dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_t_e01i),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_t_e01i),
+              -turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_t_e023),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_t_e023),
+              -turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_t_e23i),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_t_e23i));
+      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_c_e12i =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e23i), turned<2, 3, 4, 2>(three_m_e23),
+              three_t_e23i, four(m.e0i), turned<3, 1, 2, 3>(three_t_e23i), -three_m_e1i,
+              turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e1i), three_t_e01i,
+              -turned<3, 1, 2, 3>(three_m_e1i), four(t.e123));
+      const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
+      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto all_e023 = mul_add(
+          four(S(2)),
+          dot(-three_c_plus_e1, four(m.e0123), turned<2, 3, 4, 2>(three_c_plus_e1),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(three_c_plus_e1),
+              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
+              four(c_e123), three_m_e01, three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
+              -turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
+              turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          three_t_e023);
+      const S c_e023 = three_c_e012[1];
+      const S c_e031 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const S c_plus_e3 = three_c_plus_e1[2];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S c_plus_e2 = three_c_plus_e1[1];
+      const S m_plus_e13 = three_m_plus_e12[2];
+      const S c_plus_e1 = three_c_plus_e1[0];
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const auto all_e01i =
+          mul_add(four(S(2)),
+                  dot(three_c_plus_e1, four(m_plus_s), turned<2, 3, 4, 2>(three_c_plus_e1),
+                      three_m_plus_e12, -turned<3, 1, 2, 3>(three_c_plus_e1),
+                      turned<3, 1, 2, 3>(three_m_plus_e12), four(c_e123),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
+                      dot(-four(c_e0), three_m_e1i, -three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
+                          turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
+                          -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i))),
+                  three_t_e01i);
+      const auto all_e23i = mul_add(
+          four(S(2)),
+          dot(three_c_minus_e1, four(m.e123i), -turned<2, 3, 4, 2>(three_c_minus_e1),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e1),
+              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(three_m_plus_e12),
+              -four(c_e123), three_m_e1i, -three_c_e12i, turned<3, 1, 2, 3>(three_m_plus_e12),
+              turned<3, 1, 2, 3>(three_c_e12i), three_m_plus_e12, turned<2, 3, 4, 2>(three_c_e12i),
+              four(m_plus_s)),
+          three_t_e23i);
+      return {
+          .e023 = all_e023[0],
+          .e031 = all_e023[1],
+          .e012 = all_e023[2],
+          .e123 = mul_add(S(2),
+                          dot(-c_plus_e1, m_plus_e23, -c_plus_e2, m_plus_e13, -c_plus_e3,
+                              m_plus_e12, c_e123, m_plus_s, S(2),
+                              dot(c_e0, m.e123i, -c_e012, m.e3i, -c_e031, m.e2i, -c_e023, m.e1i)),
+                          t.e123),
+          .e01i = all_e01i[0],
+          .e02i = all_e01i[1],
+          .e03i = all_e01i[2],
+          .e23i = all_e23i[0],
+          .e31i = all_e23i[1],
+          .e12i = all_e23i[2]};
+    }
+  }
   const S c_e012 = dot(-m.e23, t.e031, m.e31, t.e023, -m.e0i, t.e012, -m.e01, t.e02i, m.e02, t.e01i,
                        m.e03, t.e123);
+  const S c_e023 = dot(-m.e31, t.e012, m.e12, t.e031, -m.e0i, t.e023, -m.e02, t.e03i, m.e03, t.e02i,
+                       m.e01, t.e123);
+  const S c_e031 = dot(-m.e12, t.e023, m.e23, t.e012, -m.e0i, t.e031, -m.e03, t.e01i, m.e01, t.e03i,
+                       m.e02, t.e123);
+  const S m_minus_s = m.s - m.e0i;
+  const S m_minus_e12 = -m.e12 + m.e012i;
+  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_e123 = dot(-m.e1i, t.e023, m.e01, t.e23i) + dot(-m.e2i, t.e031, m.e02, t.e31i) +
+                   dot(-m.e3i, t.e012, m.e03, t.e12i);
+  const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
+  const S c_e1 = dot(m.e031i, t.e03i, -m.e012i, t.e02i, m.e123i, t.e023, -m.e0123, t.e23i);
+  const S c_e2 = dot(m.e012i, t.e01i, -m.e023i, t.e03i, m.e123i, t.e031, -m.e0123, t.e31i);
   const S c_e3 = dot(m.e023i, t.e02i, -m.e031i, t.e01i, m.e123i, t.e012, -m.e0123, t.e12i);
-  const S c_e013 = dot(-m.e23, t.e012, m.e12, t.e023, m.e0i, t.e031, -m.e01, t.e03i, -m.e02, t.e123,
-                       m.e03, t.e01i);
-  const S c_e023 = dot(-m.e31, t.e012, m.e12, t.e031, -m.e0i, t.e023, m.e01, t.e123, -m.e02, t.e03i,
-                       m.e03, t.e02i);
-  const S c_e123 = dot(-m.e1i, t.e023, -m.e2i, t.e031, -m.e3i, t.e012, m.e01, t.e23i, m.e02, t.e31i,
-                       m.e03, t.e12i);
-  const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
   const S c_e01i = dot(-m.e31, t.e03i, m.e12, t.e02i, -m.e2i, t.e012, m.e3i, t.e031, -m.e02, t.e12i,
                        m.e03, t.e31i);
-  const S c_e02i = dot(m.e23, t.e03i, -m.e12, t.e01i, m.e1i, t.e012, -m.e3i, t.e023, m.e01, t.e12i,
-                       -m.e03, t.e23i);
-  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, m.e0i, t.e12i, -m.e1i, t.e02i, m.e2i, t.e01i,
-                       -m.e3i, t.e123);
+  const S c_e02i = dot(-m.e12, t.e01i, m.e23, t.e03i, -m.e3i, t.e023, m.e1i, t.e012, -m.e03, t.e23i,
+                       m.e01, t.e12i);
   const S c_e03i = dot(-m.e23, t.e02i, m.e31, t.e01i, -m.e1i, t.e031, m.e2i, t.e023, -m.e01, t.e31i,
                        m.e02, t.e23i);
-  const S c_e13i = dot(-m.e23, t.e12i, m.e12, t.e23i, -m.e0i, t.e31i, -m.e1i, t.e03i, m.e2i, t.e123,
-                       m.e3i, t.e01i);
-  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, m.e0i, t.e23i, -m.e1i, t.e123, -m.e2i, t.e03i,
-                       m.e3i, t.e02i);
   const S c_plus_e1 = c_e1 + c_e01i;
-  const S c_minus_e1 = c_e1 - c_e01i;
   const S c_plus_e2 = c_e2 + c_e02i;
-  const S c_minus_e2 = c_e2 - c_e02i;
   const S c_plus_e3 = c_e3 + c_e03i;
-  const S c_minus_e3 = c_e3 - c_e03i;
   const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
-  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S c_e12i = dot(-m.e23, t.e31i, m.e31, t.e23i, m.e0i, t.e12i, -m.e1i, t.e02i, m.e2i, t.e01i,
+                       -m.e3i, t.e123);
+  const S c_e23i = dot(-m.e31, t.e12i, m.e12, t.e31i, m.e0i, t.e23i, -m.e2i, t.e03i, m.e3i, t.e02i,
+                       -m.e1i, t.e123);
+  const S c_e31i = dot(-m.e12, t.e23i, m.e23, t.e12i, m.e0i, t.e31i, -m.e3i, t.e01i, m.e1i, t.e03i,
+                       -m.e2i, t.e123);
+  const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
+  const S c_minus_e1 = c_e1 - c_e01i;
+  const S c_minus_e2 = c_e2 - c_e02i;
+  const S c_minus_e3 = c_e3 - c_e03i;
   return {
       .e023 =
           mul_add(S(2),
                   dot(-c_plus_e1, m.e0123, c_plus_e2, m.e03, -c_plus_e3, m.e02, c_e0, m_minus_e23,
-                      c_e123, m.e01, -c_e012, m_minus_e13, c_e013, m_minus_e12, c_e023, m_minus_s),
+                      c_e123, m.e01, c_e012, m_minus_e31, -c_e031, m_minus_e12, c_e023, m_minus_s),
                   t.e023),
       .e031 =
           mul_add(S(2),
-                  dot(-c_plus_e1, m.e03, -c_plus_e2, m.e0123, c_plus_e3, m.e01, -c_e0, m_minus_e13,
-                      c_e123, m.e02, -c_e012, m_minus_e23, -c_e013, m_minus_s, c_e023, m_minus_e12),
+                  dot(-c_plus_e2, m.e0123, c_plus_e3, m.e01, -c_plus_e1, m.e03, c_e0, m_minus_e31,
+                      c_e123, m.e02, c_e023, m_minus_e12, -c_e012, m_minus_e23, c_e031, m_minus_s),
                   t.e031),
       .e012 =
           mul_add(S(2),
-                  dot(c_plus_e1, m.e02, -c_plus_e2, m.e01, -c_plus_e3, m.e0123, c_e0, m_minus_e12,
-                      c_e123, m.e03, c_e012, m_minus_s, -c_e013, m_minus_e23, c_e023, m_minus_e13),
+                  dot(-c_plus_e3, m.e0123, c_plus_e1, m.e02, -c_plus_e2, m.e01, c_e0, m_minus_e12,
+                      c_e123, m.e03, c_e031, m_minus_e23, -c_e023, m_minus_e31, c_e012, m_minus_s),
                   t.e012),
       .e123 = mul_add(
           S(2),
           dot(-c_plus_e1, m_plus_e23, -c_plus_e2, m_plus_e13, -c_plus_e3, m_plus_e12, c_e123,
-              m_plus_s, S(2), dot(c_e0, m.e123i, -c_e012, m.e3i, c_e013, m.e2i, -c_e023, m.e1i)),
+              m_plus_s, S(2), dot(c_e0, m.e123i, -c_e012, m.e3i, -c_e031, m.e2i, -c_e023, m.e1i)),
           t.e123),
-      .e01i = mul_add(S(2),
-                      dot(c_plus_e1, m_plus_s, c_plus_e2, m_plus_e12, -c_plus_e3, m_plus_e13,
-                          c_e123, m_plus_e23, S(2),
-                          dot(-c_e0, m.e1i, -c_e012, m.e2i, -c_e013, m.e3i, -c_e023, m.e123i)),
-                      t.e01i),
+      .e01i = mul_add(
+          S(2),
+          dot(c_plus_e1, m_plus_s, c_plus_e2, m_plus_e12, -c_plus_e3, m_plus_e13, c_e123,
+              m_plus_e23, S(2), dot(-c_e0, m.e1i, -c_e012, m.e2i, c_e031, m.e3i, -c_e023, m.e123i)),
+          t.e01i),
       .e02i = mul_add(
           S(2),
-          dot(-c_plus_e1, m_plus_e12, c_plus_e2, m_plus_s, c_plus_e3, m_plus_e23, c_e123,
-              m_plus_e13, S(2), dot(-c_e0, m.e2i, c_e012, m.e1i, c_e013, m.e123i, -c_e023, m.e3i)),
+          dot(c_plus_e2, m_plus_s, c_plus_e3, m_plus_e23, -c_plus_e1, m_plus_e12, c_e123,
+              m_plus_e13, S(2), dot(-c_e0, m.e2i, -c_e023, m.e3i, c_e012, m.e1i, -c_e031, m.e123i)),
           t.e02i),
       .e03i = mul_add(
           S(2),
-          dot(c_plus_e1, m_plus_e13, -c_plus_e2, m_plus_e23, c_plus_e3, m_plus_s, c_e123,
-              m_plus_e12, S(2), dot(-c_e0, m.e3i, -c_e012, m.e123i, c_e013, m.e1i, c_e023, m.e2i)),
+          dot(c_plus_e3, m_plus_s, c_plus_e1, m_plus_e13, -c_plus_e2, m_plus_e23, c_e123,
+              m_plus_e12, S(2), dot(-c_e0, m.e3i, -c_e031, m.e1i, c_e023, m.e2i, -c_e012, m.e123i)),
           t.e03i),
       .e23i =
           mul_add(S(2),
                   dot(c_minus_e1, m.e123i, -c_minus_e2, m.e3i, c_minus_e3, m.e2i, -c_ei, m_plus_e23,
-                      -c_e123, m.e1i, -c_e12i, m_plus_e13, -c_e13i, m_plus_e12, c_e23i, m_plus_s),
+                      -c_e123, m.e1i, -c_e12i, m_plus_e13, c_e31i, m_plus_e12, c_e23i, m_plus_s),
                   t.e23i),
       .e31i =
           mul_add(S(2),
-                  dot(c_minus_e1, m.e3i, c_minus_e2, m.e123i, -c_minus_e3, m.e1i, -c_ei, m_plus_e13,
-                      -c_e123, m.e2i, c_e12i, m_plus_e23, -c_e13i, m_plus_s, -c_e23i, m_plus_e12),
+                  dot(c_minus_e2, m.e123i, -c_minus_e3, m.e1i, c_minus_e1, m.e3i, -c_ei, m_plus_e13,
+                      -c_e123, m.e2i, -c_e23i, m_plus_e12, c_e12i, m_plus_e23, c_e31i, m_plus_s),
                   t.e31i),
       .e12i =
           mul_add(S(2),
-                  dot(-c_minus_e1, m.e2i, c_minus_e2, m.e1i, c_minus_e3, m.e123i, -c_ei, m_plus_e12,
-                      -c_e123, m.e3i, c_e12i, m_plus_s, c_e13i, m_plus_e23, c_e23i, m_plus_e13),
+                  dot(c_minus_e3, m.e123i, -c_minus_e1, m.e2i, c_minus_e2, m.e1i, -c_ei, m_plus_e12,
+                      -c_e123, m.e3i, -c_e31i, m_plus_e23, c_e23i, m_plus_e13, c_e12i, m_plus_s),
                   t.e12i)};
 }
 
@@ -1832,58 +3005,129 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Quadvector<S> sandwich_lean(const Versor<S>& m,
                                                     const Quadvector<S>& q) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_q_e023i = four(q.e023i, q.e031i, q.e012i, q.e023i);
+      const auto three_c_e01 = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
+      const auto three_c_e12 = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
+                                   turned<2, 3, 4, 2>(three_m_e023i), three_q_e023i);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e012i =
+          dot(-three_m_e23, turned<2, 3, 4, 2>(three_q_e023i), turned<2, 3, 4, 2>(three_m_e23),
+              three_q_e023i, -turned<3, 1, 2, 3>(three_m_e1i), four(q.e0123),
+              turned<3, 1, 2, 3>(three_m_e01), four(q.e123i));
+      const auto three_c_plus_e12 = three_c_e12 - three_c_e012i;
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
+      const auto three_c_e1i = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
+      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const S c_e03 = three_c_e01[2];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const S c_e02 = three_c_e01[1];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S c_e01 = three_c_e01[0];
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S c_plus_e23 = three_c_plus_e12[1];
+      const S c_plus_e31 = three_c_plus_e12[2];
+      const S c_plus_e12 = three_c_plus_e12[0];
+      const auto all_e023i =
+          mul_add(four(S(2)),
+                  dot(three_c_plus_e12, turned<3, 1, 2, 3>(three_m_plus_e12),
+                      -turned<3, 1, 2, 3>(three_c_plus_e12), three_m_plus_e12,
+                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m_plus_s), -four(c_e0i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
+                      dot(three_c_e01, four(m.e123i), -turned<2, 3, 4, 2>(three_c_e01),
+                          turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e01),
+                          turned<2, 3, 4, 2>(three_m_e1i), -four(c_e0123), three_m_e1i)),
+                  three_q_e023i);
+      const S c_e3i = three_c_e1i[2];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S c_e2i = three_c_e1i[1];
+      const S m_plus_e13 = three_m_plus_e12[2];
+      const S c_e1i = three_c_e1i[0];
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S c_minus_e23 = three_c_minus_e12[1];
+      const S c_minus_e31 = three_c_minus_e12[2];
+      const S c_minus_e12 = three_c_minus_e12[0];
+      return {.e0123 = mul_add(S(2),
+                               dot(-c_plus_e12, m.e03, -c_plus_e31, m.e02, -c_plus_e23, m.e01,
+                                   -c_e0i, m.e0123, c_e01, m_minus_e23, c_e02, m_minus_e31, c_e03,
+                                   m_minus_e12, c_e0123, m_minus_s),
+                               q.e0123),
+              .e023i = all_e023i[0],
+              .e031i = all_e023i[1],
+              .e012i = all_e023i[2],
+              .e123i = mul_add(S(2),
+                               dot(-c_minus_e12, m.e3i, -c_minus_e31, m.e2i, -c_minus_e23, m.e1i,
+                                   c_e0i, m.e123i, -c_e1i, m_plus_e23, -c_e2i, m_plus_e13, -c_e3i,
+                                   m_plus_e12, c_e123i, m_plus_s),
+                               q.e123i)};
+    }
+  }
+  const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
+  const S m_minus_s = m.s - m.e0i;
   const S c_e01 = dot(m.e023i, q.e0123, -m.e0123, q.e023i);
   const S c_e02 = dot(m.e031i, q.e0123, -m.e0123, q.e031i);
-  const S c_e12 = dot(-m.e023i, q.e031i, m.e031i, q.e023i);
   const S c_e03 = dot(m.e012i, q.e0123, -m.e0123, q.e012i);
-  const S c_e13 = dot(-m.e023i, q.e012i, m.e012i, q.e023i);
-  const S c_e23 = dot(-m.e031i, q.e012i, m.e012i, q.e031i);
-  const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
+  const S m_minus_e12 = -m.e12 + m.e012i;
+  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
   const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
+  const S c_e12 = dot(-m.e023i, q.e031i, m.e031i, q.e023i);
+  const S c_e23 = dot(-m.e031i, q.e012i, m.e012i, q.e031i);
+  const S c_e31 = dot(-m.e012i, q.e023i, m.e023i, q.e012i);
+  const S c_e012i = dot(-m.e23, q.e031i, m.e31, q.e023i, -m.e3i, q.e0123, m.e03, q.e123i);
+  const S c_e023i = dot(-m.e31, q.e012i, m.e12, q.e031i, -m.e1i, q.e0123, m.e01, q.e123i);
+  const S c_e031i = dot(-m.e12, q.e023i, m.e23, q.e012i, -m.e2i, q.e0123, m.e02, q.e123i);
+  const S c_plus_e12 = c_e12 - c_e012i;
+  const S c_plus_e23 = c_e23 - c_e023i;
+  const S c_plus_e31 = c_e31 - c_e031i;
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
+  const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
   const S c_e1i = dot(-m.e023i, q.e123i, m.e123i, q.e023i);
   const S c_e2i = dot(-m.e031i, q.e123i, m.e123i, q.e031i);
-  const S c_e012i = dot(-m.e23, q.e031i, m.e31, q.e023i, -m.e3i, q.e0123, m.e03, q.e123i);
   const S c_e3i = dot(-m.e012i, q.e123i, m.e123i, q.e012i);
-  const S c_e013i = dot(-m.e23, q.e012i, m.e12, q.e023i, m.e2i, q.e0123, -m.e02, q.e123i);
-  const S c_e023i = dot(-m.e31, q.e012i, m.e12, q.e031i, -m.e1i, q.e0123, m.e01, q.e123i);
-  const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
-  const S c_plus_e12 = c_e12 - c_e012i;
   const S c_minus_e12 = c_e12 + c_e012i;
-  const S c_plus_e13 = c_e13 - c_e013i;
-  const S c_minus_e13 = c_e13 + c_e013i;
-  const S c_plus_e23 = c_e23 - c_e023i;
   const S c_minus_e23 = c_e23 + c_e023i;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
-  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S c_minus_e31 = c_e31 + c_e031i;
   return {.e0123 = mul_add(
               S(2),
-              dot(-c_plus_e12, m.e03, c_plus_e13, m.e02, -c_plus_e23, m.e01, -c_e0i, m.e0123, c_e01,
-                  m_minus_e23, -c_e02, m_minus_e13, c_e03, m_minus_e12, c_e0123, m_minus_s),
+              dot(-c_plus_e12, m.e03, -c_plus_e31, m.e02, -c_plus_e23, m.e01, -c_e0i, m.e0123,
+                  c_e01, m_minus_e23, c_e02, m_minus_e31, c_e03, m_minus_e12, c_e0123, m_minus_s),
               q.e0123),
           .e023i = mul_add(S(2),
-                           dot(c_plus_e12, m_plus_e13, c_plus_e13, m_plus_e12, -c_plus_e23,
+                           dot(c_plus_e12, m_plus_e13, -c_plus_e31, m_plus_e12, -c_plus_e23,
                                m_plus_s, -c_e0i, m_plus_e23, S(2),
                                dot(c_e01, m.e123i, -c_e02, m.e3i, c_e03, m.e2i, -c_e0123, m.e1i)),
                            q.e023i),
           .e031i = mul_add(S(2),
-                           dot(-c_plus_e12, m_plus_e23, c_plus_e13, m_plus_s, c_plus_e23,
-                               m_plus_e12, -c_e0i, m_plus_e13, S(2),
-                               dot(c_e01, m.e3i, c_e02, m.e123i, -c_e03, m.e1i, -c_e0123, m.e2i)),
+                           dot(c_plus_e23, m_plus_e12, -c_plus_e12, m_plus_e23, -c_plus_e31,
+                               m_plus_s, -c_e0i, m_plus_e13, S(2),
+                               dot(c_e02, m.e123i, -c_e03, m.e1i, c_e01, m.e3i, -c_e0123, m.e2i)),
                            q.e031i),
           .e012i = mul_add(S(2),
-                           dot(-c_plus_e12, m_plus_s, -c_plus_e13, m_plus_e23, -c_plus_e23,
-                               m_plus_e13, -c_e0i, m_plus_e12, S(2),
-                               dot(-c_e01, m.e2i, c_e02, m.e1i, c_e03, m.e123i, -c_e0123, m.e3i)),
+                           dot(c_plus_e31, m_plus_e23, -c_plus_e23, m_plus_e13, -c_plus_e12,
+                               m_plus_s, -c_e0i, m_plus_e12, S(2),
+                               dot(c_e03, m.e123i, -c_e01, m.e2i, c_e02, m.e1i, -c_e0123, m.e3i)),
                            q.e012i),
           .e123i = mul_add(
               S(2),
-              dot(-c_minus_e12, m.e3i, c_minus_e13, m.e2i, -c_minus_e23, m.e1i, c_e0i, m.e123i,
+              dot(-c_minus_e12, m.e3i, -c_minus_e31, m.e2i, -c_minus_e23, m.e1i, c_e0i, m.e123i,
                   -c_e1i, m_plus_e23, -c_e2i, m_plus_e13, -c_e3i, m_plus_e12, c_e123i, m_plus_s),
               q.e123i)};
 }
@@ -1897,53 +3141,115 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Vector<S> sandwich_lean(const Similarity<S>& m,
                                                                const Vector<S>& v) noexcept {
-  const S c_e0 = m.e0i * v.e0;
-  const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0);
-  const S c_e2 = dot(m.e23, v.e3, -m.e12, v.e1, -m.e2i, v.e0);
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e012 = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S c_e0 = m.e0i * v.e0;
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
+              -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+                                  turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
+                                  -three_m_e1i, four(v.e0));
+      const auto three_c_minus_e1 = -three_c_e01i + three_c_e1;
+      const S c_e123 = m.e123i * v.e0;
+      const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+                                    turned<3, 1, 2, 3>(three_v_e1));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S c_e023 = three_c_e012[1];
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S c_e013 = three_c_e012[2];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S c_e012 = three_c_e012[0];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const auto all_e1 =
+          mul_add(four(S(2)),
+                  dot(four(c_e123), turned<2, 3, 4, 2>(three_m_minus_e12), three_c_minus_e1,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_minus_e1), three_m_minus_e12,
+                      turned<3, 1, 2, 3>(three_c_minus_e1), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  three_v_e1);
+      const S c_e23i = three_c_e12i[1];
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S c_e31i = three_c_e12i[2];
+      const S m_plus_e13 = three_m_plus_e12[2];
+      const S c_e12i = three_c_e12i[0];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S c_minus_e3 = three_c_minus_e1[2];
+      const S c_minus_e2 = three_c_minus_e1[1];
+      const S c_minus_e1 = three_c_minus_e1[0];
+      return {.e0 = mul_add(S(2),
+                            dot(-c_e0, m_minus_s, c_e012, m_minus_e12, c_e013, m_minus_e31, c_e023,
+                                m_minus_e23),
+                            v.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .ei = mul_add(
+                  S(2),
+                  dot(c_e123, m.e123i, -c_minus_e1, m.e1i, -c_minus_e2, m.e2i, -c_minus_e3, m.e3i,
+                      c_e12i, m_plus_e12, c_e31i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
+                  v.ei)};
+    }
+  }
   const S c_e012 = m.e012i * v.e0;
-  const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0);
-  const S c_e013 = m.e031i * v.e0;
   const S c_e023 = m.e023i * v.e0;
-  const S c_e123 = m.e123i * v.e0;
-  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
+  const S c_e013 = m.e031i * v.e0;
+  const S m_minus_e12 = -m.e12 + m.e012i;
+  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_e0 = m.e0i * v.e0;
+  const S m_minus_s = m.s - m.e0i;
   const S c_e01i = dot(m.e031i, v.e3, -m.e012i, v.e2);
-  const S c_e02i = dot(-m.e023i, v.e3, m.e012i, v.e1);
-  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
+  const S c_e02i = dot(m.e012i, v.e1, -m.e023i, v.e3);
   const S c_e03i = dot(m.e023i, v.e2, -m.e031i, v.e1);
-  const S c_e13i = dot(-m.e031i, v.ei, m.e123i, v.e2);
-  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  const S c_e1 = dot(-m.e31, v.e3, m.e12, v.e2, -m.e1i, v.e0);
+  const S c_e2 = dot(-m.e12, v.e1, m.e23, v.e3, -m.e2i, v.e0);
+  const S c_e3 = dot(-m.e23, v.e2, m.e31, v.e1, -m.e3i, v.e0);
   const S c_minus_e1 = -c_e01i + c_e1;
   const S c_minus_e2 = -c_e02i + c_e2;
   const S c_minus_e3 = -c_e03i + c_e3;
+  const S c_e123 = m.e123i * v.e0;
+  const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
   const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
+  const S c_e12i = dot(m.e012i, v.ei, -m.e123i, v.e3);
+  const S c_e23i = dot(m.e023i, v.ei, -m.e123i, v.e1);
+  const S c_e31i = dot(m.e031i, v.ei, -m.e123i, v.e2);
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
-  const S m_minus_e23 = -m.e23 + m.e023i;
-  return {.e0 = mul_add(
-              S(2),
-              dot(-c_e0, m_minus_s, c_e012, m_minus_e12, -c_e013, m_minus_e13, c_e023, m_minus_e23),
-              v.e0),
-          .e1 = mul_add(S(2),
-                        dot(c_e123, m_minus_e23, c_minus_e1, m_minus_s, -c_minus_e2, m_minus_e12,
-                            -c_minus_e3, m_minus_e13),
-                        v.e1),
-          .e2 = mul_add(S(2),
-                        dot(-c_e123, m_minus_e13, c_minus_e1, m_minus_e12, c_minus_e2, m_minus_s,
-                            -c_minus_e3, m_minus_e23),
-                        v.e2),
-          .e3 = mul_add(S(2),
-                        dot(c_e123, m_minus_e12, c_minus_e1, m_minus_e13, c_minus_e2, m_minus_e23,
-                            c_minus_e3, m_minus_s),
-                        v.e3),
-          .ei = mul_add(
-              S(2),
-              dot(c_e123, m.e123i, -c_minus_e1, m.e1i, -c_minus_e2, m.e2i, -c_minus_e3, m.e3i,
-                  c_e12i, m_plus_e12, -c_e13i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
-              v.ei)};
+  const S m_plus_e13 = m.e31 + m.e031i;
+  return {
+      .e0 = mul_add(
+          S(2),
+          dot(-c_e0, m_minus_s, c_e012, m_minus_e12, c_e013, m_minus_e31, c_e023, m_minus_e23),
+          v.e0),
+      .e1 = mul_add(S(2),
+                    dot(c_e123, m_minus_e23, c_minus_e1, m_minus_s, -c_minus_e2, m_minus_e12,
+                        c_minus_e3, m_minus_e31),
+                    v.e1),
+      .e2 = mul_add(S(2),
+                    dot(c_e123, m_minus_e31, c_minus_e2, m_minus_s, -c_minus_e3, m_minus_e23,
+                        c_minus_e1, m_minus_e12),
+                    v.e2),
+      .e3 = mul_add(S(2),
+                    dot(c_e123, m_minus_e12, c_minus_e3, m_minus_s, -c_minus_e1, m_minus_e31,
+                        c_minus_e2, m_minus_e23),
+                    v.e3),
+      .ei = mul_add(S(2),
+                    dot(c_e123, m.e123i, -c_minus_e1, m.e1i, -c_minus_e2, m.e2i, -c_minus_e3, m.e3i,
+                        c_e12i, m_plus_e12, c_e31i, m_plus_e13, c_e23i, m_plus_e23, c_ei, m_plus_s),
+                    v.ei)};
 }
 
 /// sandwich_lean: Similarity Bivector -> Bivector
@@ -1955,77 +3261,156 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich_lean(const Similarity<S>& m,
                                                   const Bivector<S>& b) noexcept {
-  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i);
-  const S c_e02 = dot(b.e03, m.e23, -b.e01, m.e12, -b.e02, m.e0i);
-  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i);
-  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i);
-  const S c_e13 = dot(-b.e12, m.e23, b.e23, m.e12, -b.e03, m.e1i, b.e01, m.e3i);
-  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i);
-  const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
+              three_b_e01, turned<2, 3, 4, 2>(three_m_e1i));
+      const auto three_c_e012i =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
+              turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i));
+      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_c_e1i =
+          dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
+              turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
+              four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
+              turned<3, 1, 2, 3>(three_m_e1i));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
+      const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+      const auto three_c_e01 = dot(-turned<3, 1, 2, 3>(three_b_e01),
+                                   turned<2, 3, 4, 2>(three_m_e23), turned<2, 3, 4, 2>(three_b_e01),
+                                   turned<3, 1, 2, 3>(three_m_e23), -three_b_e01, four(m.e0i));
+      const auto all_e23 = mul_add(four(S(2)),
+                                   dot(three_c_minus_e12, turned<3, 1, 2, 3>(three_m_minus_e12),
+                                       -turned<3, 1, 2, 3>(three_c_minus_e12), three_m_minus_e12,
+                                       turned<2, 3, 4, 2>(three_c_minus_e12), four(m_minus_s),
+                                       -four(c_e0i), turned<2, 3, 4, 2>(three_m_minus_e12)),
+                                   three_b_e23);
+      const auto all_e1i =
+          mul_add(four(S(2)),
+                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e0i),
+                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(three_m_plus_e12), three_c_e1i,
+                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_b_e1i);
+      const S c_minus_e23 = three_c_minus_e12[1];
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S c_minus_e31 = three_c_minus_e12[2];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S c_minus_e12 = three_c_minus_e12[0];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const auto all_e01 = mul_add(
+          four(S(2)),
+          dot(three_c_e01, four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
+              turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12), four(c_e0123),
+              turned<2, 3, 4, 2>(three_m_minus_e12)),
+          three_b_e01);
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = mul_add(S(-2),
+                             dot(c_minus_e12, m_minus_e12, c_minus_e31, m_minus_e31, c_minus_e23,
+                                 m_minus_e23, c_e0i, m_minus_s),
+                             b.e0i),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
+  const S m_minus_e12 = -m.e12 + m.e012i;
+  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_e12 = dot(-b.e31, m.e23, b.e23, m.e31, -b.e02, m.e1i, b.e01, m.e2i);
+  const S c_e23 = dot(-b.e12, m.e31, b.e31, m.e12, -b.e03, m.e2i, b.e02, m.e3i);
+  const S c_e31 = dot(-b.e23, m.e12, b.e12, m.e23, -b.e01, m.e3i, b.e03, m.e1i);
+  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i);
+  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i);
+  const S c_e031i = dot(-b.e23, m.e012i, b.e12, m.e023i, -b.e02, m.e123i);
+  const S c_minus_e12 = c_e12 + c_e012i;
+  const S c_minus_e23 = c_e23 + c_e023i;
+  const S c_minus_e31 = c_e31 + c_e031i;
+  const S m_minus_s = m.s - m.e0i;
   const S c_e1i =
       dot(-b.e3i, m.e31, b.e2i, m.e12, b.e1i, m.e0i, -b.e0i, m.e1i, -b.e12, m.e2i, b.e31, m.e3i);
   const S c_e2i =
-      dot(b.e3i, m.e23, -b.e1i, m.e12, b.e2i, m.e0i, b.e12, m.e1i, -b.e0i, m.e2i, -b.e23, m.e3i);
-  const S c_e012i = dot(-b.e31, m.e023i, b.e23, m.e031i, -b.e03, m.e123i);
+      dot(-b.e1i, m.e12, b.e3i, m.e23, b.e2i, m.e0i, -b.e0i, m.e2i, -b.e23, m.e3i, b.e12, m.e1i);
   const S c_e3i =
-      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e31, m.e1i, b.e23, m.e2i, -b.e0i, m.e3i);
-  const S c_e013i = dot(-b.e12, m.e023i, b.e23, m.e012i, b.e02, m.e123i);
-  const S c_e023i = dot(-b.e12, m.e031i, b.e31, m.e012i, -b.e01, m.e123i);
-  const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
-  const S c_minus_e12 = c_e12 + c_e012i;
-  const S c_minus_e13 = c_e13 + c_e013i;
-  const S c_minus_e23 = c_e23 + c_e023i;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
+      dot(-b.e2i, m.e23, b.e1i, m.e31, b.e3i, m.e0i, -b.e0i, m.e3i, -b.e31, m.e1i, b.e23, m.e2i);
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
-  const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
+  const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
+  const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
+  const S c_e01 = dot(-b.e03, m.e31, b.e02, m.e12, -b.e01, m.e0i);
+  const S c_e02 = dot(-b.e01, m.e12, b.e03, m.e23, -b.e02, m.e0i);
+  const S c_e03 = dot(-b.e02, m.e23, b.e01, m.e31, -b.e03, m.e0i);
   return {
       .e23 = mul_add(S(2),
-                     dot(-c_minus_e12, m_minus_e13, c_minus_e13, m_minus_e12, c_minus_e23,
+                     dot(c_minus_e12, m_minus_e31, -c_minus_e31, m_minus_e12, c_minus_e23,
                          m_minus_s, -c_e0i, m_minus_e23),
                      b.e23),
       .e31 = mul_add(S(2),
-                     dot(-c_minus_e12, m_minus_e23, -c_minus_e13, m_minus_s, c_minus_e23,
-                         m_minus_e12, c_e0i, m_minus_e13),
+                     dot(c_minus_e23, m_minus_e12, -c_minus_e12, m_minus_e23, c_minus_e31,
+                         m_minus_s, -c_e0i, m_minus_e31),
                      b.e31),
       .e12 = mul_add(S(2),
-                     dot(c_minus_e12, m_minus_s, -c_minus_e13, m_minus_e23, c_minus_e23,
-                         m_minus_e13, -c_e0i, m_minus_e12),
+                     dot(c_minus_e31, m_minus_e23, -c_minus_e23, m_minus_e31, c_minus_e12,
+                         m_minus_s, -c_e0i, m_minus_e12),
                      b.e12),
       .e1i =
           mul_add(S(2),
-                  dot(-c_minus_e12, m.e2i, -c_minus_e13, m.e3i, -c_minus_e23, m.e123i, c_e0i, m.e1i,
+                  dot(-c_minus_e12, m.e2i, c_minus_e31, m.e3i, -c_minus_e23, m.e123i, c_e0i, m.e1i,
                       c_e123i, m_plus_e23, c_e1i, m_plus_s, c_e2i, m_plus_e12, -c_e3i, m_plus_e13),
                   b.e1i),
       .e2i =
           mul_add(S(2),
-                  dot(c_minus_e12, m.e1i, c_minus_e13, m.e123i, -c_minus_e23, m.e3i, c_e0i, m.e2i,
-                      c_e123i, m_plus_e13, -c_e1i, m_plus_e12, c_e2i, m_plus_s, c_e3i, m_plus_e23),
+                  dot(-c_minus_e23, m.e3i, c_minus_e12, m.e1i, -c_minus_e31, m.e123i, c_e0i, m.e2i,
+                      c_e123i, m_plus_e13, c_e2i, m_plus_s, c_e3i, m_plus_e23, -c_e1i, m_plus_e12),
                   b.e2i),
       .e3i =
           mul_add(S(2),
-                  dot(-c_minus_e12, m.e123i, c_minus_e13, m.e1i, c_minus_e23, m.e2i, c_e0i, m.e3i,
-                      c_e123i, m_plus_e12, c_e1i, m_plus_e13, -c_e2i, m_plus_e23, c_e3i, m_plus_s),
+                  dot(-c_minus_e31, m.e1i, c_minus_e23, m.e2i, -c_minus_e12, m.e123i, c_e0i, m.e3i,
+                      c_e123i, m_plus_e12, c_e3i, m_plus_s, c_e1i, m_plus_e13, -c_e2i, m_plus_e23),
                   b.e3i),
       .e0i = mul_add(S(-2),
-                     dot(c_minus_e12, m_minus_e12, c_minus_e13, m_minus_e13, c_minus_e23,
+                     dot(c_minus_e12, m_minus_e12, c_minus_e31, m_minus_e31, c_minus_e23,
                          m_minus_e23, c_e0i, m_minus_s),
                      b.e0i),
       .e01 = mul_add(
           S(2),
-          dot(c_e01, m_minus_s, -c_e02, m_minus_e12, -c_e03, m_minus_e13, c_e0123, m_minus_e23),
+          dot(c_e01, m_minus_s, -c_e02, m_minus_e12, c_e03, m_minus_e31, c_e0123, m_minus_e23),
           b.e01),
       .e02 = mul_add(
           S(2),
-          dot(c_e01, m_minus_e12, c_e02, m_minus_s, -c_e03, m_minus_e23, -c_e0123, m_minus_e13),
+          dot(c_e02, m_minus_s, -c_e03, m_minus_e23, c_e01, m_minus_e12, c_e0123, m_minus_e31),
           b.e02),
       .e03 = mul_add(
-          S(2), dot(c_e01, m_minus_e13, c_e02, m_minus_e23, c_e03, m_minus_s, c_e0123, m_minus_e12),
+          S(2),
+          dot(c_e03, m_minus_s, -c_e01, m_minus_e31, c_e02, m_minus_e23, c_e0123, m_minus_e12),
           b.e03)};
 }
 
@@ -2038,47 +3423,108 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr Bivector<S> sandwich_lean(const Motor<S>& m,
                                                   const Bivector<S>& b) noexcept {
-  const S twice_e23 = S(2) * m.e23;
-  const S twice_e31 = S(2) * m.e31;
-  const S twice_e12 = S(2) * m.e12;
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const S twice_e3i = three_twice_e1i[2];
+      const S twice_e2i = three_twice_e1i[1];
+      const S twice_e1i = three_twice_e1i[0];
+      const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
+      const S twice_e123i = S(2) * m.e123i;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_c_e012i = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
+              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_b_e01),
+              three_twice_e1i, three_b_e01, turned<2, 3, 4, 2>(three_twice_e1i));
+      const auto three_c_minus_e12 = -three_c_e012i + three_c_e12;
+      const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
+      const auto three_c_e1i = dot(
+          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_twice_e23),
+          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_twice_e23), -four(b.e0i),
+          three_twice_e1i, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e1i),
+          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e1i));
+      const S c_e123i = b.e0i * twice_e123i;
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23));
+      const auto all_e23 =
+          dot(three_b_e23, -three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e23),
+              turned<2, 3, 4, 2>(three_c_minus_e12), four(m.s), four(c_e0i), three_m_e23);
+      const auto all_e1i =
+          dot(three_b_e1i, -four(c_e123i), three_m_e23, -three_c_minus_e12,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e12),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_minus_e12),
+              four(m.e123i), three_c_e1i, four(m.s), turned<2, 3, 4, 2>(three_c_e1i),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1i),
+              turned<2, 3, 4, 2>(three_m_e23), four(c_e0i), three_m_e1i);
+      const S c_minus_e23 = three_c_minus_e12[1];
+      const S c_minus_e31 = three_c_minus_e12[2];
+      const S c_minus_e12 = three_c_minus_e12[0];
+      const auto all_e01 = dot(three_b_e01, three_c_e01, four(m.s), turned<2, 3, 4, 2>(three_c_e01),
+                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01),
+                               turned<2, 3, 4, 2>(three_m_e23));
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e0i = dot(b.e0i, c_minus_e12, m.e12, c_minus_e31, m.e31, c_minus_e23, m.e23, -c_e0i,
+                         m.s),
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S twice_e1i = S(2) * m.e1i;
   const S twice_e2i = S(2) * m.e2i;
   const S twice_e3i = S(2) * m.e3i;
-  const S twice_e123i = S(2) * m.e123i;
-  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
-  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12);
-  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31, -b.e02, twice_e1i, b.e01, twice_e2i);
-  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
-  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12, -b.e03, twice_e1i, b.e01, twice_e3i);
-  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12, -b.e03, twice_e2i, b.e02, twice_e3i);
   const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
+  const S twice_e123i = S(2) * m.e123i;
+  const S c_e012i = b.e03 * twice_e123i;
+  const S c_e023i = b.e01 * twice_e123i;
+  const S c_e013i = b.e02 * twice_e123i;
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
+  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31, -b.e02, twice_e1i, b.e01, twice_e2i);
+  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12, -b.e03, twice_e2i, b.e02, twice_e3i);
+  const S c_e31 = dot(-b.e23, twice_e12, b.e12, twice_e23, -b.e01, twice_e3i, b.e03, twice_e1i);
+  const S c_minus_e12 = -c_e012i + c_e12;
+  const S c_minus_e23 = -c_e023i + c_e23;
+  const S c_minus_e31 = -c_e013i + c_e31;
   const S c_e1i = dot(-b.e3i, twice_e31, b.e2i, twice_e12, -b.e0i, twice_e1i, -b.e12, twice_e2i,
                       b.e31, twice_e3i);
-  const S c_e2i = dot(b.e3i, twice_e23, -b.e1i, twice_e12, b.e12, twice_e1i, -b.e0i, twice_e2i,
-                      -b.e23, twice_e3i);
-  const S c_e012i = b.e03 * twice_e123i;
-  const S c_e3i = dot(-b.e2i, twice_e23, b.e1i, twice_e31, -b.e31, twice_e1i, b.e23, twice_e2i,
-                      -b.e0i, twice_e3i);
-  const S c_e013i = b.e02 * twice_e123i;
-  const S c_e023i = b.e01 * twice_e123i;
+  const S c_e2i = dot(-b.e1i, twice_e12, b.e3i, twice_e23, -b.e0i, twice_e2i, -b.e23, twice_e3i,
+                      b.e12, twice_e1i);
+  const S c_e3i = dot(-b.e2i, twice_e23, b.e1i, twice_e31, -b.e0i, twice_e3i, -b.e31, twice_e1i,
+                      b.e23, twice_e2i);
   const S c_e123i = b.e0i * twice_e123i;
-  const S c_minus_e12 = -c_e012i + c_e12;
-  const S c_minus_e13 = c_e013i + c_e13;
-  const S c_minus_e23 = -c_e023i + c_e23;
+  const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12);
+  const S c_e02 = dot(-b.e01, twice_e12, b.e03, twice_e23);
+  const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31);
   return {
-      .e23 = dot(b.e23, -c_minus_e12, m.e31, -c_minus_e13, m.e12, c_minus_e23, m.s, c_e0i, m.e23),
-      .e31 = dot(b.e31, c_minus_e12, m.e23, -c_minus_e13, m.s, -c_minus_e23, m.e12, c_e0i, m.e31),
-      .e12 = dot(b.e12, c_minus_e12, m.s, c_minus_e13, m.e23, c_minus_e23, m.e31, c_e0i, m.e12),
-      .e1i = dot(b.e1i, -c_e123i, m.e23, -c_minus_e12, m.e2i, -c_minus_e13, m.e3i, -c_minus_e23,
+      .e23 = dot(b.e23, -c_minus_e12, m.e31, c_minus_e31, m.e12, c_minus_e23, m.s, c_e0i, m.e23),
+      .e31 = dot(b.e31, -c_minus_e23, m.e12, c_minus_e12, m.e23, c_minus_e31, m.s, c_e0i, m.e31),
+      .e12 = dot(b.e12, -c_minus_e31, m.e23, c_minus_e23, m.e31, c_minus_e12, m.s, c_e0i, m.e12),
+      .e1i = dot(b.e1i, -c_e123i, m.e23, -c_minus_e12, m.e2i, c_minus_e31, m.e3i, -c_minus_e23,
                  m.e123i, c_e1i, m.s, c_e2i, m.e12, -c_e3i, m.e31, c_e0i, m.e1i),
-      .e2i = dot(b.e2i, -c_e123i, m.e31, c_minus_e12, m.e1i, c_minus_e13, m.e123i, -c_minus_e23,
-                 m.e3i, -c_e1i, m.e12, c_e2i, m.s, c_e3i, m.e23, c_e0i, m.e2i),
-      .e3i = dot(b.e3i, -c_e123i, m.e12, -c_minus_e12, m.e123i, c_minus_e13, m.e1i, c_minus_e23,
-                 m.e2i, c_e1i, m.e31, -c_e2i, m.e23, c_e3i, m.s, c_e0i, m.e3i),
-      .e0i = dot(b.e0i, c_minus_e12, m.e12, -c_minus_e13, m.e31, c_minus_e23, m.e23, -c_e0i, m.s),
+      .e2i = dot(b.e2i, -c_e123i, m.e31, -c_minus_e23, m.e3i, c_minus_e12, m.e1i, -c_minus_e31,
+                 m.e123i, c_e2i, m.s, c_e3i, m.e23, -c_e1i, m.e12, c_e0i, m.e2i),
+      .e3i = dot(b.e3i, -c_e123i, m.e12, -c_minus_e31, m.e1i, c_minus_e23, m.e2i, -c_minus_e12,
+                 m.e123i, c_e3i, m.s, c_e1i, m.e31, -c_e2i, m.e23, c_e0i, m.e3i),
+      .e0i = dot(b.e0i, c_minus_e12, m.e12, c_minus_e31, m.e31, c_minus_e23, m.e23, -c_e0i, m.s),
       .e01 = dot(b.e01, c_e01, m.s, c_e02, m.e12, -c_e03, m.e31),
-      .e02 = dot(b.e02, -c_e01, m.e12, c_e02, m.s, c_e03, m.e23),
-      .e03 = dot(b.e03, c_e01, m.e31, -c_e02, m.e23, c_e03, m.s)};
+      .e02 = dot(b.e02, c_e02, m.s, c_e03, m.e23, -c_e01, m.e12),
+      .e03 = dot(b.e03, c_e03, m.s, c_e01, m.e31, -c_e02, m.e23)};
 }
 
 /// vector_matrix: Versor -> VersorVectorMatrix
@@ -3763,8 +5209,8 @@ template <class S>
                                        -m.e012i, m.e012i),
           .e012i = S(2) * scalar::compensated_dot(m.e012i, m.s, -m.e031i, m.e23, m.e023i, m.e31,
                                                   -m.e0i, m.e12),
-          .e013i = S(2) * scalar::compensated_dot(-m.e031i, m.s, -m.e012i, m.e23, m.e0i, m.e31,
-                                                  m.e023i, m.e12),
+          .e031i = S(2) * scalar::compensated_dot(m.e031i, m.s, m.e012i, m.e23, -m.e0i, m.e31,
+                                                  -m.e023i, m.e12),
           .e023i = S(2) * scalar::compensated_dot(m.e023i, m.s, -m.e0i, m.e23, -m.e012i, m.e31,
                                                   m.e031i, m.e12),
           .e123i = S(2) * scalar::compensated_dot(m.e123i, m.s, -m.e1i, m.e23, -m.e2i, m.e31,
@@ -3774,23 +5220,56 @@ template <class S>
 
 /// unit_defect_change: Similarity Similarity -> SimilarityDefect
 /// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
-/// Cost: 53 mul, 43 add (36 fused).
+/// Cost: 53 mul, 43 add (32 fused).
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr SimilarityDefect<S> unit_defect_change(
     const Similarity<S>& m, const Similarity<S>& low) noexcept {
-  return {.s = S(2) * dot(low.s, m.s, low.e23, m.e23, low.e31, m.e31, low.e12, m.e12, -low.e0i,
-                          m.e0i, -low.e023i, m.e023i, -low.e031i, m.e031i, -low.e012i, m.e012i),
-          .e012i = S(2) * dot(low.e012i, m.s, -low.e031i, m.e23, low.e023i, m.e31, -low.e0i, m.e12,
-                              -low.e12, m.e0i, low.e31, m.e023i, -low.e23, m.e031i, low.s, m.e012i),
-          .e013i = S(2) * dot(-low.e031i, m.s, -low.e012i, m.e23, low.e0i, m.e31, low.e023i, m.e12,
-                              low.e31, m.e0i, low.e12, m.e023i, -low.s, m.e031i, -low.e23, m.e012i),
-          .e023i = S(2) * dot(low.e023i, m.s, -low.e0i, m.e23, -low.e012i, m.e31, low.e031i, m.e12,
-                              -low.e23, m.e0i, low.s, m.e023i, low.e12, m.e031i, -low.e31, m.e012i),
-          .e123i = S(2) * dot(low.e123i, m.s, -low.e1i, m.e23, -low.e2i, m.e31, -low.e3i, m.e12,
-                              -low.e23, m.e1i, -low.e023i, m.e1i, -low.e31, m.e2i, -low.e031i,
-                              m.e2i, -low.e12, m.e3i, -low.e012i, m.e3i, low.s, m.e123i, low.e0i,
-                              m.e123i, low.e123i, m.e0i, -low.e1i, m.e023i, -low.e2i, m.e031i,
-                              -low.e3i, m.e012i)};
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_low_e023i = four(low.e023i, low.e031i, low.e012i, low.e023i);
+      const auto three_low_e23 = four(low.e23, low.e31, low.e12, low.e23);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto all_e012i =
+          four(S(2)) *
+          dot(turned<3, 1, 2, 3>(three_low_e023i), four(m.s), -turned<2, 3, 4, 2>(three_low_e023i),
+              three_m_e23, three_low_e023i, turned<2, 3, 4, 2>(three_m_e23), -four(low.e0i),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_low_e23), four(m.e0i),
+              turned<2, 3, 4, 2>(three_low_e23), three_m_e023i, -three_low_e23,
+              turned<2, 3, 4, 2>(three_m_e023i), four(low.s), turned<3, 1, 2, 3>(three_m_e023i));
+      const auto three_low_e1i = four(low.e1i, low.e2i, low.e3i, low.e1i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      return {
+          .s = S(2) *
+               dot(lanes::total(dot(three_low_e23, three_m_e23, -three_low_e023i, three_m_e023i)),
+                   low.s, m.s, -low.e0i, m.e0i),
+          .e012i = all_e012i[0],
+          .e031i = all_e012i[2],
+          .e023i = all_e012i[1],
+          .e123i = S(2) * dot(lanes::total(dot(-three_low_e1i, three_m_e23, -three_low_e23,
+                                               three_m_e1i, -three_low_e023i, three_m_e1i,
+                                               -three_low_e1i, three_m_e023i)),
+                              low.e123i, m.s, low.s, m.e123i, low.e0i, m.e123i, low.e123i, m.e0i)};
+    }
+  }
+  return {
+      .s = S(2) *
+           dot(dot(low.e23, m.e23, -low.e023i, m.e023i) + dot(low.e31, m.e31, -low.e031i, m.e031i) +
+                   dot(low.e12, m.e12, -low.e012i, m.e012i),
+               low.s, m.s, -low.e0i, m.e0i),
+      .e012i = S(2) * dot(low.e012i, m.s, -low.e031i, m.e23, low.e023i, m.e31, -low.e0i, m.e12,
+                          -low.e12, m.e0i, low.e31, m.e023i, -low.e23, m.e031i, low.s, m.e012i),
+      .e031i = S(2) * dot(low.e031i, m.s, -low.e023i, m.e12, low.e012i, m.e23, -low.e0i, m.e31,
+                          -low.e31, m.e0i, low.e23, m.e012i, -low.e12, m.e023i, low.s, m.e031i),
+      .e023i = S(2) * dot(low.e023i, m.s, -low.e012i, m.e31, low.e031i, m.e12, -low.e0i, m.e23,
+                          -low.e23, m.e0i, low.e12, m.e031i, -low.e31, m.e012i, low.s, m.e023i),
+      .e123i = S(2) *
+               dot(dot(-low.e1i, m.e23, -low.e23, m.e1i, -low.e023i, m.e1i, -low.e1i, m.e023i) +
+                       dot(-low.e2i, m.e31, -low.e31, m.e2i, -low.e031i, m.e2i, -low.e2i, m.e031i) +
+                       dot(-low.e3i, m.e12, -low.e12, m.e3i, -low.e012i, m.e3i, -low.e3i, m.e012i),
+                   low.e123i, m.s, low.s, m.e123i, low.e0i, m.e123i, low.e123i, m.e0i)};
 }
 
 /// unit_correction: Similarity SimilarityDefect -> Similarity
@@ -3805,7 +5284,7 @@ template <class S>
       using lanes::turned;
       const S half_s = S(-0.5) * d.s;
       const S half_e012i = S(-0.5) * d.e012i;
-      const S half_e013i = S(-0.5) * d.e013i;
+      const S half_e031i = S(-0.5) * d.e031i;
       const S half_e023i = S(-0.5) * d.e023i;
       const S half_e123i = S(-0.5) * d.e123i;
       const auto four_m_s = four(m.s, m.e23, m.e31, m.e12);
@@ -3813,15 +5292,15 @@ template <class S>
       const auto four_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e123i);
       const auto sum1 =
           dot(four(half_s), four_m_s, four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i),
-              four(half_e013i), turned<3, 4, -1, -2>(four_m_e0i), four(half_e023i),
+              four(half_e031i), turned<-3, -4, 1, 2>(four_m_e0i), four(half_e023i),
               turned<-2, 1, 4, -3>(four_m_e0i));
       const auto sum2 =
           dot(four(half_s), four_m_e0i, four(half_e012i), turned<-4, 3, -2, 1>(four_m_s),
-              four(half_e013i), turned<3, 4, -1, -2>(four_m_s), four(half_e023i),
+              four(half_e031i), turned<-3, -4, 1, 2>(four_m_s), four(half_e023i),
               turned<-2, 1, 4, -3>(four_m_s));
       const auto sum3 =
           dot(four(half_s), four_m_e1i, four(half_e012i), turned<2, -1, -4, 3>(four_m_e1i),
-              four(half_e013i), turned<3, 4, -1, -2>(four_m_e1i), four(half_e023i),
+              four(half_e031i), turned<-3, -4, 1, 2>(four_m_e1i), four(half_e023i),
               turned<-4, 3, -2, 1>(four_m_e1i), four(half_e123i), turned<-2, -3, -4, 1>(four_m_s),
               four(half_e123i), turned<2, 3, 4, -1>(four_m_e0i));
       Similarity<S> result;
@@ -3833,25 +5312,25 @@ template <class S>
   }
   const S half_s = S(-0.5) * d.s;
   const S half_e012i = S(-0.5) * d.e012i;
-  const S half_e013i = S(-0.5) * d.e013i;
+  const S half_e031i = S(-0.5) * d.e031i;
   const S half_e023i = S(-0.5) * d.e023i;
   const S half_e123i = S(-0.5) * d.e123i;
-  return {.s = dot(half_s, m.s, -half_e012i, m.e012i, half_e013i, m.e031i, -half_e023i, m.e023i),
-          .e23 = dot(half_s, m.e23, half_e012i, m.e031i, half_e013i, m.e012i, half_e023i, m.e0i),
-          .e31 = dot(half_s, m.e31, -half_e012i, m.e023i, -half_e013i, m.e0i, half_e023i, m.e012i),
-          .e12 = dot(half_s, m.e12, half_e012i, m.e0i, -half_e013i, m.e023i, -half_e023i, m.e031i),
-          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i, half_e013i, m.e3i, -half_e023i, m.e123i,
+  return {.s = dot(half_s, m.s, -half_e012i, m.e012i, -half_e031i, m.e031i, -half_e023i, m.e023i),
+          .e23 = dot(half_s, m.e23, half_e012i, m.e031i, -half_e031i, m.e012i, half_e023i, m.e0i),
+          .e31 = dot(half_s, m.e31, -half_e012i, m.e023i, half_e031i, m.e0i, half_e023i, m.e012i),
+          .e12 = dot(half_s, m.e12, half_e012i, m.e0i, half_e031i, m.e023i, -half_e023i, m.e031i),
+          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i, -half_e031i, m.e3i, -half_e023i, m.e123i,
                      -half_e123i, m.e23, half_e123i, m.e023i),
-          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i, half_e013i, m.e123i, half_e023i, m.e3i,
+          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i, -half_e031i, m.e123i, half_e023i, m.e3i,
                      -half_e123i, m.e31, half_e123i, m.e031i),
-          .e3i = dot(half_s, m.e3i, -half_e012i, m.e123i, -half_e013i, m.e1i, -half_e023i, m.e2i,
+          .e3i = dot(half_s, m.e3i, -half_e012i, m.e123i, half_e031i, m.e1i, -half_e023i, m.e2i,
                      -half_e123i, m.e12, half_e123i, m.e012i),
-          .e123i = dot(half_s, m.e123i, half_e012i, m.e3i, -half_e013i, m.e2i, half_e023i, m.e1i,
+          .e123i = dot(half_s, m.e123i, half_e012i, m.e3i, half_e031i, m.e2i, half_e023i, m.e1i,
                        half_e123i, m.s, -half_e123i, m.e0i),
-          .e0i = dot(half_s, m.e0i, -half_e012i, m.e12, half_e013i, m.e31, -half_e023i, m.e23),
-          .e023i = dot(half_s, m.e023i, half_e012i, m.e31, half_e013i, m.e12, half_e023i, m.s),
-          .e031i = dot(half_s, m.e031i, -half_e012i, m.e23, -half_e013i, m.s, half_e023i, m.e12),
-          .e012i = dot(half_s, m.e012i, half_e012i, m.s, -half_e013i, m.e23, -half_e023i, m.e31)};
+          .e0i = dot(half_s, m.e0i, -half_e012i, m.e12, -half_e031i, m.e31, -half_e023i, m.e23),
+          .e023i = dot(half_s, m.e023i, half_e012i, m.e31, -half_e031i, m.e12, half_e023i, m.s),
+          .e031i = dot(half_s, m.e031i, -half_e012i, m.e23, half_e031i, m.s, half_e023i, m.e12),
+          .e012i = dot(half_s, m.e012i, half_e012i, m.s, half_e031i, m.e23, -half_e023i, m.e31)};
 }
 
 /// unit_defect: Versor -> VersorDefect
@@ -3870,9 +5349,9 @@ template <class S>
           .e012i = S(2) * scalar::compensated_dot(m.e012i, m.s, -m.e031i, m.e23, m.e023i, m.e31,
                                                   -m.e0i, m.e12, m.e02, m.e1i, -m.e01, m.e2i,
                                                   -m.e0123, m.e3i, m.e03, m.e123i),
-          .e013i = S(2) * scalar::compensated_dot(-m.e031i, m.s, -m.e012i, m.e23, m.e0i, m.e31,
-                                                  m.e023i, m.e12, m.e03, m.e1i, m.e0123, m.e2i,
-                                                  -m.e01, m.e3i, -m.e02, m.e123i),
+          .e031i = S(2) * scalar::compensated_dot(m.e031i, m.s, m.e012i, m.e23, -m.e0i, m.e31,
+                                                  -m.e023i, m.e12, -m.e03, m.e1i, -m.e0123, m.e2i,
+                                                  m.e01, m.e3i, m.e02, m.e123i),
           .e023i = S(2) * scalar::compensated_dot(m.e023i, m.s, -m.e0i, m.e23, -m.e012i, m.e31,
                                                   m.e031i, m.e12, -m.e0123, m.e1i, m.e03, m.e2i,
                                                   -m.e02, m.e3i, m.e01, m.e123i),
@@ -3883,36 +5362,79 @@ template <class S>
 
 /// unit_defect_change: Versor Versor -> VersorDefect
 /// m ~low + low ~m: unit_defect(m + low) − unit_defect(m), but for low².
-/// Cost: 102 mul, 90 add (72 fused).
+/// Cost: 102 mul, 90 add (63 fused).
 template <class S>
 [[nodiscard]] constexpr VersorDefect<S> unit_defect_change(const Versor<S>& m,
                                                            const Versor<S>& low) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_low_e01 = four(low.e01, low.e02, low.e03, low.e01);
+      const auto three_low_e023i = four(low.e023i, low.e031i, low.e012i, low.e023i);
+      const auto three_low_e1i = four(low.e1i, low.e2i, low.e3i, low.e1i);
+      const auto three_low_e23 = four(low.e23, low.e31, low.e12, low.e23);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto all_e012i =
+          four(S(2)) *
+          dot(turned<3, 1, 2, 3>(three_low_e023i), four(m.s), -turned<2, 3, 4, 2>(three_low_e023i),
+              three_m_e23, three_low_e023i, turned<2, 3, 4, 2>(three_m_e23), -four(low.e0i),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_low_e01), three_m_e1i,
+              -three_low_e01, turned<2, 3, 4, 2>(three_m_e1i), -four(low.e0123),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_low_e01), four(m.e123i),
+              -turned<3, 1, 2, 3>(three_low_e23), four(m.e0i), turned<2, 3, 4, 2>(three_low_e23),
+              three_m_e023i, -three_low_e23, turned<2, 3, 4, 2>(three_m_e023i), four(low.s),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_low_e1i), three_m_e01,
+              three_low_e1i, turned<2, 3, 4, 2>(three_m_e01), four(low.e123i),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(three_low_e1i), four(m.e0123));
+      return {
+          .s = S(2) *
+               dot(lanes::total(dot(three_low_e23, three_m_e23, three_low_e01, three_m_e1i,
+                                    -three_low_e023i, three_m_e023i, three_low_e1i, three_m_e01)),
+                   low.s, m.s, low.e0123, m.e123i, -low.e0i, m.e0i, low.e123i, m.e0123),
+          .e0123 = S(2) *
+                   dot(lanes::total(dot(-three_low_e01, three_m_e23, three_low_e01, three_m_e023i,
+                                        -three_low_e23, three_m_e01, three_low_e023i, three_m_e01)),
+                       low.e0123, m.s, -low.e0123, m.e0i, low.s, m.e0123, -low.e0i, m.e0123),
+          .e012i = all_e012i[0],
+          .e031i = all_e012i[2],
+          .e023i = all_e012i[1],
+          .e123i = S(2) * dot(lanes::total(dot(-three_low_e1i, three_m_e23, -three_low_e23,
+                                               three_m_e1i, -three_low_e023i, three_m_e1i,
+                                               -three_low_e1i, three_m_e023i)),
+                              low.e123i, m.s, low.s, m.e123i, low.e0i, m.e123i, low.e123i, m.e0i)};
+    }
+  }
   return {
-      .s = S(2) * dot(low.s, m.s, low.e23, m.e23, low.e31, m.e31, low.e12, m.e12, low.e01, m.e1i,
-                      low.e02, m.e2i, low.e03, m.e3i, low.e0123, m.e123i, -low.e0i, m.e0i,
-                      -low.e023i, m.e023i, -low.e031i, m.e031i, -low.e012i, m.e012i, low.e1i, m.e01,
-                      low.e2i, m.e02, low.e3i, m.e03, low.e123i, m.e0123),
-      .e0123 = S(2) * dot(low.e0123, m.s, -low.e01, m.e23, -low.e02, m.e31, -low.e03, m.e12,
-                          -low.e0123, m.e0i, low.e01, m.e023i, low.e02, m.e031i, low.e03, m.e012i,
-                          -low.e23, m.e01, low.e023i, m.e01, -low.e31, m.e02, low.e031i, m.e02,
-                          -low.e12, m.e03, low.e012i, m.e03, low.s, m.e0123, -low.e0i, m.e0123),
+      .s = S(2) * dot(dot(low.e23, m.e23, low.e01, m.e1i, -low.e023i, m.e023i, low.e1i, m.e01) +
+                          dot(low.e31, m.e31, low.e02, m.e2i, -low.e031i, m.e031i, low.e2i, m.e02) +
+                          dot(low.e12, m.e12, low.e03, m.e3i, -low.e012i, m.e012i, low.e3i, m.e03),
+                      low.s, m.s, low.e0123, m.e123i, -low.e0i, m.e0i, low.e123i, m.e0123),
+      .e0123 =
+          S(2) * dot(dot(-low.e01, m.e23, low.e01, m.e023i, -low.e23, m.e01, low.e023i, m.e01) +
+                         dot(-low.e02, m.e31, low.e02, m.e031i, -low.e31, m.e02, low.e031i, m.e02) +
+                         dot(-low.e03, m.e12, low.e03, m.e012i, -low.e12, m.e03, low.e012i, m.e03),
+                     low.e0123, m.s, -low.e0123, m.e0i, low.s, m.e0123, -low.e0i, m.e0123),
       .e012i = S(2) * dot(low.e012i, m.s, -low.e031i, m.e23, low.e023i, m.e31, -low.e0i, m.e12,
                           low.e02, m.e1i, -low.e01, m.e2i, -low.e0123, m.e3i, low.e03, m.e123i,
                           -low.e12, m.e0i, low.e31, m.e023i, -low.e23, m.e031i, low.s, m.e012i,
                           -low.e2i, m.e01, low.e1i, m.e02, low.e123i, m.e03, -low.e3i, m.e0123),
-      .e013i = S(2) * dot(-low.e031i, m.s, -low.e012i, m.e23, low.e0i, m.e31, low.e023i, m.e12,
-                          low.e03, m.e1i, low.e0123, m.e2i, -low.e01, m.e3i, -low.e02, m.e123i,
-                          low.e31, m.e0i, low.e12, m.e023i, -low.s, m.e031i, -low.e23, m.e012i,
-                          -low.e3i, m.e01, -low.e123i, m.e02, low.e1i, m.e03, low.e2i, m.e0123),
-      .e023i = S(2) * dot(low.e023i, m.s, -low.e0i, m.e23, -low.e012i, m.e31, low.e031i, m.e12,
-                          -low.e0123, m.e1i, low.e03, m.e2i, -low.e02, m.e3i, low.e01, m.e123i,
-                          -low.e23, m.e0i, low.s, m.e023i, low.e12, m.e031i, -low.e31, m.e012i,
-                          low.e123i, m.e01, -low.e3i, m.e02, low.e2i, m.e03, -low.e1i, m.e0123),
-      .e123i =
-          S(2) * dot(low.e123i, m.s, -low.e1i, m.e23, -low.e2i, m.e31, -low.e3i, m.e12, -low.e23,
-                     m.e1i, -low.e023i, m.e1i, -low.e31, m.e2i, -low.e031i, m.e2i, -low.e12, m.e3i,
-                     -low.e012i, m.e3i, low.s, m.e123i, low.e0i, m.e123i, low.e123i, m.e0i,
-                     -low.e1i, m.e023i, -low.e2i, m.e031i, -low.e3i, m.e012i)};
+      .e031i = S(2) * dot(low.e031i, m.s, -low.e023i, m.e12, low.e012i, m.e23, -low.e0i, m.e31,
+                          low.e01, m.e3i, -low.e03, m.e1i, -low.e0123, m.e2i, low.e02, m.e123i,
+                          -low.e31, m.e0i, low.e23, m.e012i, -low.e12, m.e023i, low.s, m.e031i,
+                          -low.e1i, m.e03, low.e3i, m.e01, low.e123i, m.e02, -low.e2i, m.e0123),
+      .e023i = S(2) * dot(low.e023i, m.s, -low.e012i, m.e31, low.e031i, m.e12, -low.e0i, m.e23,
+                          low.e03, m.e2i, -low.e02, m.e3i, -low.e0123, m.e1i, low.e01, m.e123i,
+                          -low.e23, m.e0i, low.e12, m.e031i, -low.e31, m.e012i, low.s, m.e023i,
+                          -low.e3i, m.e02, low.e2i, m.e03, low.e123i, m.e01, -low.e1i, m.e0123),
+      .e123i = S(2) *
+               dot(dot(-low.e1i, m.e23, -low.e23, m.e1i, -low.e023i, m.e1i, -low.e1i, m.e023i) +
+                       dot(-low.e2i, m.e31, -low.e31, m.e2i, -low.e031i, m.e2i, -low.e2i, m.e031i) +
+                       dot(-low.e3i, m.e12, -low.e12, m.e3i, -low.e012i, m.e3i, -low.e3i, m.e012i),
+                   low.e123i, m.s, low.s, m.e123i, low.e0i, m.e123i, low.e123i, m.e0i)};
 }
 
 /// unit_correction: Versor VersorDefect -> Versor
@@ -3928,7 +5450,7 @@ template <class S>
       const S half_s = S(-0.5) * d.s;
       const S half_e0123 = S(-0.5) * d.e0123;
       const S half_e012i = S(-0.5) * d.e012i;
-      const S half_e013i = S(-0.5) * d.e013i;
+      const S half_e031i = S(-0.5) * d.e031i;
       const S half_e023i = S(-0.5) * d.e023i;
       const S half_e123i = S(-0.5) * d.e123i;
       const auto four_m_s = four(m.s, m.e23, m.e31, m.e12);
@@ -3937,23 +5459,23 @@ template <class S>
       const auto four_m_e01 = four(m.e01, m.e02, m.e03, m.e0123);
       const auto sum1 =
           dot(four(half_s), four_m_s, four(half_e0123), turned<4, -1, -2, -3>(four_m_e1i),
-              four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i), four(half_e013i),
-              turned<3, 4, -1, -2>(four_m_e0i), four(half_e023i), turned<-2, 1, 4, -3>(four_m_e0i),
+              four(half_e012i), turned<-4, 3, -2, 1>(four_m_e0i), four(half_e031i),
+              turned<-3, -4, 1, 2>(four_m_e0i), four(half_e023i), turned<-2, 1, 4, -3>(four_m_e0i),
               four(half_e123i), turned<4, -1, -2, -3>(four_m_e01));
       const auto sum2 =
           dot(four(half_s), four_m_e0i, four(half_e0123), turned<-4, 1, 2, 3>(four_m_e1i),
-              four(half_e012i), turned<-4, 3, -2, 1>(four_m_s), four(half_e013i),
-              turned<3, 4, -1, -2>(four_m_s), four(half_e023i), turned<-2, 1, 4, -3>(four_m_s),
+              four(half_e012i), turned<-4, 3, -2, 1>(four_m_s), four(half_e031i),
+              turned<-3, -4, 1, 2>(four_m_s), four(half_e023i), turned<-2, 1, 4, -3>(four_m_s),
               four(half_e123i), turned<4, -1, -2, -3>(four_m_e01));
       const auto sum3 =
           dot(four(half_s), four_m_e1i, four(half_e012i), turned<2, -1, -4, 3>(four_m_e1i),
-              four(half_e013i), turned<3, 4, -1, -2>(four_m_e1i), four(half_e023i),
+              four(half_e031i), turned<-3, -4, 1, 2>(four_m_e1i), four(half_e023i),
               turned<-4, 3, -2, 1>(four_m_e1i), four(half_e123i), turned<-2, -3, -4, 1>(four_m_s),
               four(half_e123i), turned<2, 3, 4, -1>(four_m_e0i));
       const auto sum4 =
           dot(four(half_s), four_m_e01, four(half_e0123), turned<-2, -3, -4, 1>(four_m_s),
               four(half_e0123), turned<-2, -3, -4, 1>(four_m_e0i), four(half_e012i),
-              turned<-2, 1, 4, -3>(four_m_e01), four(half_e013i), turned<-3, -4, 1, 2>(four_m_e01),
+              turned<-2, 1, 4, -3>(four_m_e01), four(half_e031i), turned<3, 4, -1, -2>(four_m_e01),
               four(half_e023i), turned<4, -3, 2, -1>(four_m_e01));
       Versor<S> result;
       lanes::store<0>(result, sum1);
@@ -3966,41 +5488,41 @@ template <class S>
   const S half_s = S(-0.5) * d.s;
   const S half_e0123 = S(-0.5) * d.e0123;
   const S half_e012i = S(-0.5) * d.e012i;
-  const S half_e013i = S(-0.5) * d.e013i;
+  const S half_e031i = S(-0.5) * d.e031i;
   const S half_e023i = S(-0.5) * d.e023i;
   const S half_e123i = S(-0.5) * d.e123i;
-  return {.s = dot(half_s, m.s, half_e0123, m.e123i, -half_e012i, m.e012i, half_e013i, m.e031i,
+  return {.s = dot(half_s, m.s, half_e0123, m.e123i, -half_e012i, m.e012i, -half_e031i, m.e031i,
                    -half_e023i, m.e023i, half_e123i, m.e0123),
-          .e23 = dot(half_s, m.e23, -half_e0123, m.e1i, half_e012i, m.e031i, half_e013i, m.e012i,
+          .e23 = dot(half_s, m.e23, -half_e0123, m.e1i, half_e012i, m.e031i, -half_e031i, m.e012i,
                      half_e023i, m.e0i, -half_e123i, m.e01),
-          .e31 = dot(half_s, m.e31, -half_e0123, m.e2i, -half_e012i, m.e023i, -half_e013i, m.e0i,
+          .e31 = dot(half_s, m.e31, -half_e0123, m.e2i, -half_e012i, m.e023i, half_e031i, m.e0i,
                      half_e023i, m.e012i, -half_e123i, m.e02),
-          .e12 = dot(half_s, m.e12, -half_e0123, m.e3i, half_e012i, m.e0i, -half_e013i, m.e023i,
+          .e12 = dot(half_s, m.e12, -half_e0123, m.e3i, half_e012i, m.e0i, half_e031i, m.e023i,
                      -half_e023i, m.e031i, -half_e123i, m.e03),
-          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i, half_e013i, m.e3i, -half_e023i, m.e123i,
+          .e1i = dot(half_s, m.e1i, half_e012i, m.e2i, -half_e031i, m.e3i, -half_e023i, m.e123i,
                      -half_e123i, m.e23, half_e123i, m.e023i),
-          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i, half_e013i, m.e123i, half_e023i, m.e3i,
+          .e2i = dot(half_s, m.e2i, -half_e012i, m.e1i, -half_e031i, m.e123i, half_e023i, m.e3i,
                      -half_e123i, m.e31, half_e123i, m.e031i),
-          .e3i = dot(half_s, m.e3i, -half_e012i, m.e123i, -half_e013i, m.e1i, -half_e023i, m.e2i,
+          .e3i = dot(half_s, m.e3i, -half_e012i, m.e123i, half_e031i, m.e1i, -half_e023i, m.e2i,
                      -half_e123i, m.e12, half_e123i, m.e012i),
-          .e123i = dot(half_s, m.e123i, half_e012i, m.e3i, -half_e013i, m.e2i, half_e023i, m.e1i,
+          .e123i = dot(half_s, m.e123i, half_e012i, m.e3i, half_e031i, m.e2i, half_e023i, m.e1i,
                        half_e123i, m.s, -half_e123i, m.e0i),
-          .e0i = dot(half_s, m.e0i, -half_e0123, m.e123i, -half_e012i, m.e12, half_e013i, m.e31,
+          .e0i = dot(half_s, m.e0i, -half_e0123, m.e123i, -half_e012i, m.e12, -half_e031i, m.e31,
                      -half_e023i, m.e23, half_e123i, m.e0123),
-          .e023i = dot(half_s, m.e023i, half_e0123, m.e1i, half_e012i, m.e31, half_e013i, m.e12,
+          .e023i = dot(half_s, m.e023i, half_e0123, m.e1i, half_e012i, m.e31, -half_e031i, m.e12,
                        half_e023i, m.s, -half_e123i, m.e01),
-          .e031i = dot(half_s, m.e031i, half_e0123, m.e2i, -half_e012i, m.e23, -half_e013i, m.s,
+          .e031i = dot(half_s, m.e031i, half_e0123, m.e2i, -half_e012i, m.e23, half_e031i, m.s,
                        half_e023i, m.e12, -half_e123i, m.e02),
-          .e012i = dot(half_s, m.e012i, half_e0123, m.e3i, half_e012i, m.s, -half_e013i, m.e23,
+          .e012i = dot(half_s, m.e012i, half_e0123, m.e3i, half_e012i, m.s, half_e031i, m.e23,
                        -half_e023i, m.e31, -half_e123i, m.e03),
           .e01 = dot(half_s, m.e01, -half_e0123, m.e23, -half_e0123, m.e023i, -half_e012i, m.e02,
-                     -half_e013i, m.e03, half_e023i, m.e0123),
+                     half_e031i, m.e03, half_e023i, m.e0123),
           .e02 = dot(half_s, m.e02, -half_e0123, m.e31, -half_e0123, m.e031i, half_e012i, m.e01,
-                     -half_e013i, m.e0123, -half_e023i, m.e03),
+                     half_e031i, m.e0123, -half_e023i, m.e03),
           .e03 = dot(half_s, m.e03, -half_e0123, m.e12, -half_e0123, m.e012i, half_e012i, m.e0123,
-                     half_e013i, m.e01, half_e023i, m.e02),
+                     -half_e031i, m.e01, half_e023i, m.e02),
           .e0123 = dot(half_s, m.e0123, half_e0123, m.s, half_e0123, m.e0i, -half_e012i, m.e03,
-                       half_e013i, m.e02, -half_e023i, m.e01)};
+                       -half_e031i, m.e02, -half_e023i, m.e01)};
 }
 
 }  // namespace hamotor::cga3

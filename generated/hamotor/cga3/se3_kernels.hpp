@@ -8,6 +8,7 @@
 
 #include "hamotor/cga3/kernels.hpp"
 #include "hamotor/cga3/se3_elements.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/rate_jacobian.hpp"
 
 namespace hamotor::cga3::se3 {
@@ -77,27 +78,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> Ad(const Motor<S>& m,
                                                        const se3::Rate<S>& w) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_c_e12 = dot(three_twice_e23, turned<2, 3, 4, 2>(three_w_w23),
+                                   -turned<2, 3, 4, 2>(three_twice_e23), three_w_w23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_c_e1i =
+          dot(turned<2, 3, 4, 2>(three_twice_e23), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(three_twice_e23), turned<2, 3, 4, 2>(three_w_v1),
+              turned<2, 3, 4, 2>(three_twice_e1i), turned<3, 1, 2, 3>(three_w_w23),
+              -turned<3, 1, 2, 3>(three_twice_e1i), turned<2, 3, 4, 2>(three_w_w23));
+      const auto all_w23 = dot(three_w_w23, three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+                               -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+                               -turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto all_v1 =
+          dot(three_w_v1, three_c_e12, turned<2, 3, 4, 2>(three_m_e1i),
+              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_c_e12), four(m.e123i), -three_c_e1i, four(m.s),
+              -turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e23));
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2]};
+    }
+  }
   const S twice_e23 = S(2) * m.e23;
   const S twice_e31 = S(2) * m.e31;
   const S twice_e12 = S(2) * m.e12;
+  const S c_e12 = dot(twice_e23, w.w31, -twice_e31, w.w23);
+  const S c_e23 = dot(twice_e31, w.w12, -twice_e12, w.w31);
+  const S c_e31 = dot(twice_e12, w.w23, -twice_e23, w.w12);
   const S twice_e1i = S(2) * m.e1i;
   const S twice_e2i = S(2) * m.e2i;
   const S twice_e3i = S(2) * m.e3i;
-  const S c_e12 = dot(twice_e23, w.w31, -twice_e31, w.w23);
-  const S c_e13 = dot(twice_e23, w.w12, -twice_e12, w.w23);
-  const S c_e23 = dot(twice_e31, w.w12, -twice_e12, w.w31);
   const S c_e1i = dot(twice_e31, w.v3, -twice_e12, w.v2, twice_e2i, w.w12, -twice_e3i, w.w31);
-  const S c_e2i = dot(-twice_e23, w.v3, twice_e12, w.v1, -twice_e1i, w.w12, twice_e3i, w.w23);
+  const S c_e2i = dot(twice_e12, w.v1, -twice_e23, w.v3, twice_e3i, w.w23, -twice_e1i, w.w12);
   const S c_e3i = dot(twice_e23, w.v2, -twice_e31, w.v1, twice_e1i, w.w31, -twice_e2i, w.w23);
-  return {.w23 = dot(w.w23, c_e12, m.e31, c_e13, m.e12, -c_e23, m.s),
-          .w31 = dot(w.w31, -c_e12, m.e23, c_e13, m.s, c_e23, m.e12),
-          .w12 = dot(w.w12, -c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31),
-          .v1 = dot(w.v1, c_e12, m.e2i, c_e13, m.e3i, c_e23, m.e123i, -c_e1i, m.s, -c_e2i, m.e12,
+  return {.w23 = dot(w.w23, c_e12, m.e31, -c_e31, m.e12, -c_e23, m.s),
+          .w31 = dot(w.w31, c_e23, m.e12, -c_e12, m.e23, -c_e31, m.s),
+          .w12 = dot(w.w12, c_e31, m.e23, -c_e23, m.e31, -c_e12, m.s),
+          .v1 = dot(w.v1, c_e12, m.e2i, -c_e31, m.e3i, c_e23, m.e123i, -c_e1i, m.s, -c_e2i, m.e12,
                     c_e3i, m.e31),
-          .v2 = dot(w.v2, -c_e12, m.e1i, -c_e13, m.e123i, c_e23, m.e3i, c_e1i, m.e12, -c_e2i, m.s,
-                    -c_e3i, m.e23),
-          .v3 = dot(w.v3, c_e12, m.e123i, -c_e13, m.e1i, -c_e23, m.e2i, -c_e1i, m.e31, c_e2i, m.e23,
-                    -c_e3i, m.s)};
+          .v2 = dot(w.v2, c_e23, m.e3i, -c_e12, m.e1i, c_e31, m.e123i, -c_e2i, m.s, -c_e3i, m.e23,
+                    c_e1i, m.e12),
+          .v3 = dot(w.v3, c_e31, m.e1i, -c_e23, m.e2i, c_e12, m.e123i, -c_e3i, m.s, -c_e1i, m.e31,
+                    c_e2i, m.e23)};
 }
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
@@ -107,27 +142,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> Ad_star_inverse(
     const Motor<S>& m, const se3::Momentum<S>& mu) noexcept {
-  const S twice_e23 = S(2) * m.e23;
-  const S twice_e31 = S(2) * m.e31;
-  const S twice_e12 = S(2) * m.e12;
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_c_e01i =
+          dot(turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_twice_e23),
+              -turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_twice_e23),
+              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_twice_e1i),
+              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_twice_e1i));
+      const auto three_c_e012 = dot(turned<2, 3, 4, 2>(three_mu_p1), three_twice_e23, -three_mu_p1,
+                                    turned<2, 3, 4, 2>(three_twice_e23));
+      const auto all_l23 =
+          dot(three_mu_l23, three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
+              -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_c_e012), four(m.e123i), -three_c_e01i, four(m.s),
+              -turned<2, 3, 4, 2>(three_c_e01i), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e01i), turned<2, 3, 4, 2>(three_m_e23));
+      const auto all_p1 = dot(three_mu_p1, three_c_e012, turned<2, 3, 4, 2>(three_m_e23),
+                              -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e23),
+                              -turned<2, 3, 4, 2>(three_c_e012), four(m.s));
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2]};
+    }
+  }
   const S twice_e1i = S(2) * m.e1i;
   const S twice_e2i = S(2) * m.e2i;
   const S twice_e3i = S(2) * m.e3i;
-  const S c_e012 = dot(mu.p2, twice_e23, -mu.p1, twice_e31);
-  const S c_e013 = dot(mu.p3, twice_e23, -mu.p1, twice_e12);
-  const S c_e023 = dot(mu.p3, twice_e31, -mu.p2, twice_e12);
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
   const S c_e01i = dot(mu.l12, twice_e31, -mu.l31, twice_e12, mu.p3, twice_e2i, -mu.p2, twice_e3i);
-  const S c_e02i = dot(-mu.l12, twice_e23, mu.l23, twice_e12, -mu.p3, twice_e1i, mu.p1, twice_e3i);
+  const S c_e02i = dot(mu.l23, twice_e12, -mu.l12, twice_e23, mu.p1, twice_e3i, -mu.p3, twice_e1i);
   const S c_e03i = dot(mu.l31, twice_e23, -mu.l23, twice_e31, mu.p2, twice_e1i, -mu.p1, twice_e2i);
-  return {.l23 = dot(mu.l23, c_e012, m.e2i, c_e013, m.e3i, c_e023, m.e123i, -c_e01i, m.s, -c_e02i,
+  const S c_e012 = dot(mu.p2, twice_e23, -mu.p1, twice_e31);
+  const S c_e023 = dot(mu.p3, twice_e31, -mu.p2, twice_e12);
+  const S c_e031 = dot(mu.p1, twice_e12, -mu.p3, twice_e23);
+  return {.l23 = dot(mu.l23, c_e012, m.e2i, -c_e031, m.e3i, c_e023, m.e123i, -c_e01i, m.s, -c_e02i,
                      m.e12, c_e03i, m.e31),
-          .l31 = dot(mu.l31, -c_e012, m.e1i, -c_e013, m.e123i, c_e023, m.e3i, c_e01i, m.e12,
-                     -c_e02i, m.s, -c_e03i, m.e23),
-          .l12 = dot(mu.l12, c_e012, m.e123i, -c_e013, m.e1i, -c_e023, m.e2i, -c_e01i, m.e31,
-                     c_e02i, m.e23, -c_e03i, m.s),
-          .p1 = dot(mu.p1, c_e012, m.e31, c_e013, m.e12, -c_e023, m.s),
-          .p2 = dot(mu.p2, -c_e012, m.e23, c_e013, m.s, c_e023, m.e12),
-          .p3 = dot(mu.p3, -c_e012, m.s, -c_e013, m.e23, -c_e023, m.e31)};
+          .l31 = dot(mu.l31, c_e023, m.e3i, -c_e012, m.e1i, c_e031, m.e123i, -c_e02i, m.s, -c_e03i,
+                     m.e23, c_e01i, m.e12),
+          .l12 = dot(mu.l12, c_e031, m.e1i, -c_e023, m.e2i, c_e012, m.e123i, -c_e03i, m.s, -c_e01i,
+                     m.e31, c_e02i, m.e23),
+          .p1 = dot(mu.p1, c_e012, m.e31, -c_e031, m.e12, -c_e023, m.s),
+          .p2 = dot(mu.p2, c_e023, m.e12, -c_e012, m.e23, -c_e031, m.s),
+          .p3 = dot(mu.p3, c_e031, m.e23, -c_e023, m.e31, -c_e012, m.s)};
 }
 
 /// pairing: Momentum Rate -> Scalar

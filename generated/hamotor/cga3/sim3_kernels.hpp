@@ -10,6 +10,7 @@
 #include "hamotor/bivector_logarithm.hpp"
 #include "hamotor/cga3/kernels.hpp"
 #include "hamotor/cga3/sim3_elements.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/rate_jacobian.hpp"
 
 namespace hamotor::cga3::sim3 {
@@ -50,36 +51,83 @@ template <class S>
 
 /// kinematics: Similarity Rate -> Similarity
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 79 mul, 60 add (40 fused).  Sparsity: 72 of 84 pairs of components.
+/// Cost: 79 mul, 60 add (41 fused).  Sparsity: 72 of 84 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Similarity<S> kinematics(const Similarity<S>& m,
                                                  const sim3::Rate<S>& w) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S half_d = S(0.5) * w.d;
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_half_w23 = four(S(0.5)) * three_w_w23;
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_half_v1 = four(S(0.5)) * three_w_v1;
+      const S half_w12 = three_half_w23[2];
+      const S half_w31 = three_half_w23[1];
+      const S half_w23 = three_half_w23[0];
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto all_e23 = dot(-three_half_w23, four(m.s), turned<3, 1, 2, 3>(three_half_w23),
+                               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_half_w23),
+                               turned<3, 1, 2, 3>(three_m_e23), four(half_d), three_m_e023i);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto all_e1i =
+          dot(-four(half_d), three_m_e1i, turned<3, 1, 2, 3>(three_half_w23),
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_half_w23),
+              turned<3, 1, 2, 3>(three_m_e1i), three_half_w23, four(m.e123i), -three_half_v1,
+              four(m.s), turned<3, 1, 2, 3>(three_half_v1), turned<2, 3, 4, 2>(three_m_e23),
+              -turned<2, 3, 4, 2>(three_half_v1), turned<3, 1, 2, 3>(three_m_e23), -three_half_v1,
+              four(m.e0i), turned<3, 1, 2, 3>(three_half_v1), turned<2, 3, 4, 2>(three_m_e023i),
+              -turned<2, 3, 4, 2>(three_half_v1), turned<3, 1, 2, 3>(three_m_e023i));
+      const auto all_e023i =
+          dot(four(half_d), three_m_e23, -three_half_w23, four(m.e0i),
+              turned<3, 1, 2, 3>(three_half_w23), turned<2, 3, 4, 2>(three_m_e023i),
+              -turned<2, 3, 4, 2>(three_half_w23), turned<3, 1, 2, 3>(three_m_e023i));
+      return {.s = dot(half_w23, m.e23, half_w31, m.e31, half_w12, m.e12, half_d, m.e0i),
+              .e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e1i = all_e1i[0],
+              .e2i = all_e1i[1],
+              .e3i = all_e1i[2],
+              .e123i = mul_add(-half_d, m.e123i,
+                               lanes::total(dot(-three_half_w23, three_m_e1i, -three_half_v1,
+                                                three_m_e23, -three_half_v1, three_m_e023i))),
+              .e0i = dot(half_d, m.s, half_w23, m.e023i, half_w31, m.e031i, half_w12, m.e012i),
+              .e023i = all_e023i[0],
+              .e031i = all_e023i[1],
+              .e012i = all_e023i[2]};
+    }
+  }
+  const S half_d = S(0.5) * w.d;
   const S half_w23 = S(0.5) * w.w23;
   const S half_w31 = S(0.5) * w.w31;
   const S half_w12 = S(0.5) * w.w12;
   const S half_v1 = S(0.5) * w.v1;
   const S half_v2 = S(0.5) * w.v2;
   const S half_v3 = S(0.5) * w.v3;
-  const S half_d = S(0.5) * w.d;
   return {.s = dot(half_w23, m.e23, half_w31, m.e31, half_w12, m.e12, half_d, m.e0i),
           .e23 = dot(-half_w23, m.s, half_w12, m.e31, -half_w31, m.e12, half_d, m.e023i),
-          .e31 = dot(-half_w31, m.s, -half_w12, m.e23, half_w23, m.e12, half_d, m.e031i),
+          .e31 = dot(-half_w31, m.s, half_w23, m.e12, -half_w12, m.e23, half_d, m.e031i),
           .e12 = dot(-half_w12, m.s, half_w31, m.e23, -half_w23, m.e31, half_d, m.e012i),
           .e1i = dot(-half_d, m.e1i, half_w12, m.e2i, -half_w31, m.e3i, half_w23, m.e123i, -half_v1,
                      m.s, half_v3, m.e31, -half_v2, m.e12, -half_v1, m.e0i, half_v3, m.e031i,
                      -half_v2, m.e012i),
-          .e2i = dot(-half_w12, m.e1i, -half_d, m.e2i, half_w23, m.e3i, half_w31, m.e123i, -half_v2,
-                     m.s, -half_v3, m.e23, half_v1, m.e12, -half_v2, m.e0i, -half_v3, m.e023i,
-                     half_v1, m.e012i),
-          .e3i = dot(half_w31, m.e1i, -half_w23, m.e2i, -half_d, m.e3i, half_w12, m.e123i, -half_v3,
+          .e2i = dot(-half_d, m.e2i, half_w23, m.e3i, -half_w12, m.e1i, half_w31, m.e123i, -half_v2,
+                     m.s, half_v1, m.e12, -half_v3, m.e23, -half_v2, m.e0i, half_v1, m.e012i,
+                     -half_v3, m.e023i),
+          .e3i = dot(-half_d, m.e3i, half_w31, m.e1i, -half_w23, m.e2i, half_w12, m.e123i, -half_v3,
                      m.s, half_v2, m.e23, -half_v1, m.e31, -half_v3, m.e0i, half_v2, m.e023i,
                      -half_v1, m.e031i),
-          .e123i = dot(-half_w23, m.e1i, -half_w31, m.e2i, -half_w12, m.e3i, -half_d, m.e123i,
-                       -half_v1, m.e23, -half_v2, m.e31, -half_v3, m.e12, -half_v1, m.e023i,
-                       -half_v2, m.e031i, -half_v3, m.e012i),
+          .e123i = mul_add(-half_d, m.e123i,
+                           dot(-half_w23, m.e1i, -half_v1, m.e23, -half_v1, m.e023i) +
+                               dot(-half_w31, m.e2i, -half_v2, m.e31, -half_v2, m.e031i) +
+                               dot(-half_w12, m.e3i, -half_v3, m.e12, -half_v3, m.e012i)),
           .e0i = dot(half_d, m.s, half_w23, m.e023i, half_w31, m.e031i, half_w12, m.e012i),
           .e023i = dot(half_d, m.e23, -half_w23, m.e0i, half_w12, m.e031i, -half_w31, m.e012i),
-          .e031i = dot(half_d, m.e31, -half_w31, m.e0i, -half_w12, m.e023i, half_w23, m.e012i),
+          .e031i = dot(half_d, m.e31, -half_w31, m.e0i, half_w23, m.e012i, -half_w12, m.e023i),
           .e012i = dot(half_d, m.e12, -half_w12, m.e0i, half_w31, m.e023i, -half_w23, m.e031i)};
 }
 
@@ -89,53 +137,111 @@ template <class S>
 /// Cost: 86 mul, 76 add (58 fused).
 template <class S>
 [[nodiscard]] constexpr sim3::Rate<S> Ad(const Similarity<S>& m, const sim3::Rate<S>& w) noexcept {
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_c_e012i = dot(three_m_e023i, turned<2, 3, 4, 2>(three_w_w23),
+                                     -turned<2, 3, 4, 2>(three_m_e023i), three_w_w23);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_c_e12 = dot(three_m_e23, turned<2, 3, 4, 2>(three_w_w23),
+                                   -turned<2, 3, 4, 2>(three_m_e23), three_w_w23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_c_e1i =
+          dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_v1), -four(m.e0i),
+              three_w_v1, -three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
+              turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_w_w23));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
+      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const auto all_w23 = mul_add(
+          four(S(2)),
+          dot(three_c_e12, turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(three_c_e12), four(m.s),
+              -three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i)),
+          three_w_w23);
+      const auto all_v1 =
+          mul_add(four(S(2)),
+                  dot(three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), -three_c_e1i, four(m_plus_s),
+                      -turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_w_v1);
+      const S c_e023i = three_c_e012i[1];
+      const S c_e031i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const S c_e23 = three_c_e12[1];
+      const S c_e31 = three_c_e12[2];
+      const S c_e12 = three_c_e12[0];
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2],
+              .d = mul_add(S(2),
+                           dot(-c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e012i, m.e12,
+                               c_e031i, m.e31, c_e023i, m.e23),
+                           w.d)};
+    }
+  }
+  const S c_e012i = dot(m.e023i, w.w31, -m.e031i, w.w23);
+  const S c_e023i = dot(m.e031i, w.w12, -m.e012i, w.w31);
+  const S c_e031i = dot(m.e012i, w.w23, -m.e023i, w.w12);
   const S c_e12 = dot(m.e23, w.w31, -m.e31, w.w23);
-  const S c_e13 = dot(m.e23, w.w12, -m.e12, w.w23);
   const S c_e23 = dot(m.e31, w.w12, -m.e12, w.w31);
+  const S c_e31 = dot(m.e12, w.w23, -m.e23, w.w12);
   const S c_e1i =
       dot(m.e31, w.v3, -m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12, -m.e3i, w.w31);
   const S c_e2i =
-      dot(-m.e23, w.v3, m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d, m.e3i, w.w23);
-  const S c_e012i = dot(m.e023i, w.w31, -m.e031i, w.w23);
+      dot(m.e12, w.v1, -m.e23, w.v3, -m.e0i, w.v2, -m.e2i, w.d, m.e3i, w.w23, -m.e1i, w.w12);
   const S c_e3i =
-      dot(m.e23, w.v2, -m.e31, w.v1, -m.e0i, w.v3, m.e1i, w.w31, -m.e2i, w.w23, -m.e3i, w.d);
-  const S c_e013i = dot(m.e023i, w.w12, -m.e012i, w.w23);
-  const S c_e023i = dot(m.e031i, w.w12, -m.e012i, w.w31);
+      dot(m.e23, w.v2, -m.e31, w.v1, -m.e0i, w.v3, -m.e3i, w.d, m.e1i, w.w31, -m.e2i, w.w23);
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
   const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
   const S c_minus_e12 = c_e12 + c_e012i;
-  const S c_minus_e13 = c_e13 + c_e013i;
   const S c_minus_e23 = c_e23 + c_e023i;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
+  const S c_minus_e31 = c_e31 + c_e031i;
   return {.w23 = mul_add(S(2),
-                         dot(c_e12, m.e31, c_e13, m.e12, -c_e23, m.s, -c_e012i, m.e031i, -c_e013i,
+                         dot(c_e12, m.e31, -c_e31, m.e12, -c_e23, m.s, -c_e012i, m.e031i, c_e031i,
                              m.e012i, c_e023i, m.e0i),
                          w.w23),
           .w31 = mul_add(S(2),
-                         dot(-c_e12, m.e23, c_e13, m.s, c_e23, m.e12, c_e012i, m.e023i, -c_e013i,
-                             m.e0i, -c_e023i, m.e012i),
+                         dot(c_e23, m.e12, -c_e12, m.e23, -c_e31, m.s, -c_e023i, m.e012i, c_e012i,
+                             m.e023i, c_e031i, m.e0i),
                          w.w31),
           .w12 = mul_add(S(2),
-                         dot(-c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31, c_e012i, m.e0i, c_e013i,
-                             m.e023i, c_e023i, m.e031i),
+                         dot(c_e31, m.e23, -c_e23, m.e31, -c_e12, m.s, -c_e031i, m.e023i, c_e023i,
+                             m.e031i, c_e012i, m.e0i),
                          w.w12),
           .v1 = mul_add(S(2),
-                        dot(c_minus_e12, m.e2i, c_minus_e13, m.e3i, c_minus_e23, m.e123i, c_e123i,
+                        dot(c_minus_e12, m.e2i, -c_minus_e31, m.e3i, c_minus_e23, m.e123i, c_e123i,
                             m_plus_e23, -c_e1i, m_plus_s, -c_e2i, m_plus_e12, c_e3i, m_plus_e13),
                         w.v1),
           .v2 = mul_add(S(2),
-                        dot(-c_minus_e12, m.e1i, -c_minus_e13, m.e123i, c_minus_e23, m.e3i, c_e123i,
-                            m_plus_e13, c_e1i, m_plus_e12, -c_e2i, m_plus_s, -c_e3i, m_plus_e23),
+                        dot(c_minus_e23, m.e3i, -c_minus_e12, m.e1i, c_minus_e31, m.e123i, c_e123i,
+                            m_plus_e13, -c_e2i, m_plus_s, -c_e3i, m_plus_e23, c_e1i, m_plus_e12),
                         w.v2),
           .v3 = mul_add(S(2),
-                        dot(c_minus_e12, m.e123i, -c_minus_e13, m.e1i, -c_minus_e23, m.e2i, c_e123i,
-                            m_plus_e12, -c_e1i, m_plus_e13, c_e2i, m_plus_e23, -c_e3i, m_plus_s),
+                        dot(c_minus_e31, m.e1i, -c_minus_e23, m.e2i, c_minus_e12, m.e123i, c_e123i,
+                            m_plus_e12, -c_e3i, m_plus_s, -c_e1i, m_plus_e13, c_e2i, m_plus_e23),
                         w.v3),
           .d = mul_add(S(2),
-                       dot(-c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e012i, m.e12,
-                           -c_e013i, m.e31, c_e023i, m.e23),
+                       dot(-c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e012i, m.e12,
+                           c_e031i, m.e31, c_e023i, m.e23),
                        w.d)};
 }
 
@@ -146,47 +252,112 @@ template <class S>
 template <class S>
 [[nodiscard]] constexpr sim3::Momentum<S> Ad_star_inverse(const Similarity<S>& m,
                                                           const sim3::Momentum<S>& mu) noexcept {
-  const S c_e0 = dot(m.e023i, mu.p1, m.e031i, mu.p2, m.e012i, mu.p3);
-  const S c_e1 = dot(-m.e031i, mu.l12, m.e012i, mu.l31, -m.e123i, mu.p1);
-  const S c_e2 = dot(m.e023i, mu.l12, -m.e012i, mu.l23, -m.e123i, mu.p2);
-  const S c_e012 = dot(m.e23, mu.p2, -m.e31, mu.p1, m.e0i, mu.p3);
-  const S c_e3 = dot(-m.e023i, mu.l31, m.e031i, mu.l23, -m.e123i, mu.p3);
-  const S c_e013 = dot(m.e23, mu.p3, -m.e12, mu.p1, -m.e0i, mu.p2);
-  const S c_e023 = dot(m.e31, mu.p3, -m.e12, mu.p2, m.e0i, mu.p1);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const S c_e123 = dot(m.e1i, mu.p1, m.e2i, mu.p2, m.e3i, mu.p3);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_c_e012 =
+          dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_p1), -turned<2, 3, 4, 2>(three_m_e23),
+              three_mu_p1, four(m.e0i), turned<3, 1, 2, 3>(three_mu_p1));
+      const S c_e0 = dot(m.e023i, mu.p1, m.e031i, mu.p2, m.e012i, mu.p3);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_mu_l23),
+              -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_mu_l23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_mu_p1),
+              -turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_mu_p1));
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e1 =
+          dot(-turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_mu_l23),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_mu_l23), -four(m.e123i),
+              three_mu_p1);
+      const auto all_l23 = mul_add(
+          four(S(2)),
+          dot(-three_c_e1, four(m.e0i), -turned<2, 3, 4, 2>(three_c_e1),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e1),
+              turned<2, 3, 4, 2>(three_m_e023i), -three_c_e01i, four(m.s),
+              -turned<2, 3, 4, 2>(three_c_e01i), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e01i), turned<2, 3, 4, 2>(three_m_e23), -four(c_e0),
+              three_m_e1i, three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
+              -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_c_e012), four(m.e123i), -four(c_e123), three_m_e023i),
+          three_mu_l23);
+      const auto all_p1 =
+          mul_add(four(S(2)),
+                  dot(-four(c_e0), three_m_e23, four(c_e0), three_m_e023i, three_c_e012,
+                      turned<2, 3, 4, 2>(three_m_e23), -three_c_e012,
+                      turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012),
+                      turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(three_c_e012),
+                      turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012),
+                      four(m.s), turned<2, 3, 4, 2>(three_c_e012), four(m.e0i)),
+                  three_mu_p1);
+      const S c_e023 = three_c_e012[1];
+      const S c_e031 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const S c_e03i = three_c_e01i[2];
+      const S c_e02i = three_c_e01i[1];
+      const S c_e01i = three_c_e01i[0];
+      const S c_e3 = three_c_e1[2];
+      const S c_e2 = three_c_e1[1];
+      const S c_e1 = three_c_e1[0];
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2],
+              .q = mul_add(S(2),
+                           dot(c_e1, m.e23, c_e2, m.e31, c_e3, m.e12, c_e01i, m.e023i, c_e02i,
+                               m.e031i, c_e03i, m.e012i, c_e0, m.e123i, c_e012, m.e3i, c_e031,
+                               m.e2i, c_e023, m.e1i, -c_e123, m.s),
+                           mu.q)};
+    }
+  }
   const S c_e123 = dot(m.e1i, mu.p1, m.e2i, mu.p2, m.e3i, mu.p3);
+  const S c_e012 = dot(m.e23, mu.p2, -m.e31, mu.p1, m.e0i, mu.p3);
+  const S c_e023 = dot(m.e31, mu.p3, -m.e12, mu.p2, m.e0i, mu.p1);
+  const S c_e031 = dot(m.e12, mu.p1, -m.e23, mu.p3, m.e0i, mu.p2);
+  const S c_e0 = dot(m.e023i, mu.p1, m.e031i, mu.p2, m.e012i, mu.p3);
   const S c_e01i = dot(m.e31, mu.l12, -m.e12, mu.l31, m.e2i, mu.p3, -m.e3i, mu.p2);
-  const S c_e02i = dot(-m.e23, mu.l12, m.e12, mu.l23, -m.e1i, mu.p3, m.e3i, mu.p1);
+  const S c_e02i = dot(m.e12, mu.l23, -m.e23, mu.l12, m.e3i, mu.p1, -m.e1i, mu.p3);
   const S c_e03i = dot(m.e23, mu.l31, -m.e31, mu.l23, m.e1i, mu.p2, -m.e2i, mu.p1);
+  const S c_e1 = dot(-m.e031i, mu.l12, m.e012i, mu.l31, -m.e123i, mu.p1);
+  const S c_e2 = dot(-m.e012i, mu.l23, m.e023i, mu.l12, -m.e123i, mu.p2);
+  const S c_e3 = dot(-m.e023i, mu.l31, m.e031i, mu.l23, -m.e123i, mu.p3);
   return {.l23 = mul_add(S(2),
                          dot(-c_e1, m.e0i, -c_e2, m.e012i, c_e3, m.e031i, -c_e01i, m.s, -c_e02i,
-                             m.e12, c_e03i, m.e31, -c_e0, m.e1i, c_e012, m.e2i, c_e013, m.e3i,
+                             m.e12, c_e03i, m.e31, -c_e0, m.e1i, c_e012, m.e2i, -c_e031, m.e3i,
                              c_e023, m.e123i, -c_e123, m.e023i),
                          mu.l23),
           .l31 = mul_add(S(2),
-                         dot(c_e1, m.e012i, -c_e2, m.e0i, -c_e3, m.e023i, c_e01i, m.e12, -c_e02i,
-                             m.s, -c_e03i, m.e23, -c_e0, m.e2i, -c_e012, m.e1i, -c_e013, m.e123i,
-                             c_e023, m.e3i, -c_e123, m.e031i),
+                         dot(-c_e2, m.e0i, -c_e3, m.e023i, c_e1, m.e012i, -c_e02i, m.s, -c_e03i,
+                             m.e23, c_e01i, m.e12, -c_e0, m.e2i, c_e023, m.e3i, -c_e012, m.e1i,
+                             c_e031, m.e123i, -c_e123, m.e031i),
                          mu.l31),
           .l12 = mul_add(S(2),
-                         dot(-c_e1, m.e031i, c_e2, m.e023i, -c_e3, m.e0i, -c_e01i, m.e31, c_e02i,
-                             m.e23, -c_e03i, m.s, -c_e0, m.e3i, c_e012, m.e123i, -c_e013, m.e1i,
-                             -c_e023, m.e2i, -c_e123, m.e012i),
+                         dot(-c_e3, m.e0i, -c_e1, m.e031i, c_e2, m.e023i, -c_e03i, m.s, -c_e01i,
+                             m.e31, c_e02i, m.e23, -c_e0, m.e3i, c_e031, m.e1i, -c_e023, m.e2i,
+                             c_e012, m.e123i, -c_e123, m.e012i),
                          mu.l12),
           .p1 = mul_add(S(2),
-                        dot(-c_e0, m.e23, c_e0, m.e023i, c_e012, m.e31, -c_e012, m.e031i, c_e013,
-                            m.e12, -c_e013, m.e012i, -c_e023, m.s, c_e023, m.e0i),
+                        dot(-c_e0, m.e23, c_e0, m.e023i, c_e012, m.e31, -c_e012, m.e031i, -c_e031,
+                            m.e12, c_e031, m.e012i, -c_e023, m.s, c_e023, m.e0i),
                         mu.p1),
           .p2 = mul_add(S(2),
-                        dot(-c_e0, m.e31, c_e0, m.e031i, -c_e012, m.e23, c_e012, m.e023i, c_e013,
-                            m.s, -c_e013, m.e0i, c_e023, m.e12, -c_e023, m.e012i),
+                        dot(-c_e0, m.e31, c_e0, m.e031i, c_e023, m.e12, -c_e023, m.e012i, -c_e012,
+                            m.e23, c_e012, m.e023i, -c_e031, m.s, c_e031, m.e0i),
                         mu.p2),
           .p3 = mul_add(S(2),
-                        dot(-c_e0, m.e12, c_e0, m.e012i, -c_e012, m.s, c_e012, m.e0i, -c_e013,
-                            m.e23, c_e013, m.e023i, -c_e023, m.e31, c_e023, m.e031i),
+                        dot(-c_e0, m.e12, c_e0, m.e012i, c_e031, m.e23, -c_e031, m.e023i, -c_e023,
+                            m.e31, c_e023, m.e031i, -c_e012, m.s, c_e012, m.e0i),
                         mu.p3),
           .q = mul_add(S(2),
                        dot(c_e1, m.e23, c_e2, m.e31, c_e3, m.e12, c_e01i, m.e023i, c_e02i, m.e031i,
-                           c_e03i, m.e012i, c_e0, m.e123i, c_e012, m.e3i, -c_e013, m.e2i, c_e023,
+                           c_e03i, m.e012i, c_e0, m.e123i, c_e012, m.e3i, c_e031, m.e2i, c_e023,
                            m.e1i, -c_e123, m.s),
                        mu.q)};
 }

@@ -10,6 +10,7 @@
 #include "hamotor/bivector_logarithm.hpp"
 #include "hamotor/cga3/kernels.hpp"
 #include "hamotor/cga3/so41_elements.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/rate_jacobian.hpp"
 
 namespace hamotor::cga3::so41 {
@@ -20,309 +21,678 @@ using hamotor::select;
 
 /// ad: Rate Rate -> Rate
 /// ad_a b = [a, b] = a b − b a.
-/// Cost: 60 mul, 50 add (40 fused).  Sparsity: 60 of 100 pairs of components.
+/// Cost: 60 mul, 50 add (39 fused).  Sparsity: 60 of 100 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so41::Rate<S> ad(const so41::Rate<S>& a,
                                                         const so41::Rate<S>& b) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_a_u1 = four(a.u1, a.u2, a.u3, a.u1);
+      const auto three_a_v1 = four(a.v1, a.v2, a.v3, a.v1);
+      const auto three_a_w23 = four(a.w23, a.w31, a.w12, a.w23);
+      const auto three_b_u1 = four(b.u1, b.u2, b.u3, b.u1);
+      const auto three_b_v1 = four(b.v1, b.v2, b.v3, b.v1);
+      const auto three_b_w23 = four(b.w23, b.w31, b.w12, b.w23);
+      const auto all_w23 = dot(turned<2, 3, 4, 2>(three_a_w23), turned<3, 1, 2, 3>(three_b_w23),
+                               -turned<3, 1, 2, 3>(three_a_w23), turned<2, 3, 4, 2>(three_b_w23),
+                               turned<2, 3, 4, 2>(three_a_v1), turned<3, 1, 2, 3>(three_b_u1),
+                               -turned<3, 1, 2, 3>(three_a_v1), turned<2, 3, 4, 2>(three_b_u1),
+                               turned<2, 3, 4, 2>(three_a_u1), turned<3, 1, 2, 3>(three_b_v1),
+                               -turned<3, 1, 2, 3>(three_a_u1), turned<2, 3, 4, 2>(three_b_v1));
+      const auto all_v1 = dot(-three_a_v1, four(b.d), turned<2, 3, 4, 2>(three_a_v1),
+                              turned<3, 1, 2, 3>(three_b_w23), -turned<3, 1, 2, 3>(three_a_v1),
+                              turned<2, 3, 4, 2>(three_b_w23), turned<2, 3, 4, 2>(three_a_w23),
+                              turned<3, 1, 2, 3>(three_b_v1), -turned<3, 1, 2, 3>(three_a_w23),
+                              turned<2, 3, 4, 2>(three_b_v1), four(a.d), three_b_v1);
+      const auto all_u1 = dot(three_a_u1, four(b.d), turned<2, 3, 4, 2>(three_a_u1),
+                              turned<3, 1, 2, 3>(three_b_w23), -turned<3, 1, 2, 3>(three_a_u1),
+                              turned<2, 3, 4, 2>(three_b_w23), turned<2, 3, 4, 2>(three_a_w23),
+                              turned<3, 1, 2, 3>(three_b_u1), -turned<3, 1, 2, 3>(three_a_w23),
+                              turned<2, 3, 4, 2>(three_b_u1), -four(a.d), three_b_u1);
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2],
+              .d = lanes::total(dot(-three_a_v1, three_b_u1, three_a_u1, three_b_v1)),
+              .u1 = all_u1[0],
+              .u2 = all_u1[1],
+              .u3 = all_u1[2]};
+    }
+  }
   return {.w23 = dot(a.w31, b.w12, -a.w12, b.w31, a.v2, b.u3, -a.v3, b.u2, a.u2, b.v3, -a.u3, b.v2),
-          .w31 = dot(-a.w23, b.w12, a.w12, b.w23, -a.v1, b.u3, a.v3, b.u1, -a.u1, b.v3, a.u3, b.v1),
+          .w31 = dot(a.w12, b.w23, -a.w23, b.w12, a.v3, b.u1, -a.v1, b.u3, a.u3, b.v1, -a.u1, b.v3),
           .w12 = dot(a.w23, b.w31, -a.w31, b.w23, a.v1, b.u2, -a.v2, b.u1, a.u1, b.v2, -a.u2, b.v1),
           .v1 = dot(-a.v1, b.d, a.v2, b.w12, -a.v3, b.w31, a.w31, b.v3, -a.w12, b.v2, a.d, b.v1),
-          .v2 = dot(-a.v1, b.w12, -a.v2, b.d, a.v3, b.w23, -a.w23, b.v3, a.w12, b.v1, a.d, b.v2),
-          .v3 = dot(a.v1, b.w31, -a.v2, b.w23, -a.v3, b.d, a.w23, b.v2, -a.w31, b.v1, a.d, b.v3),
-          .d = dot(-a.v1, b.u1, -a.v2, b.u2, -a.v3, b.u3, a.u1, b.v1, a.u2, b.v2, a.u3, b.v3),
+          .v2 = dot(-a.v2, b.d, a.v3, b.w23, -a.v1, b.w12, a.w12, b.v1, -a.w23, b.v3, a.d, b.v2),
+          .v3 = dot(-a.v3, b.d, a.v1, b.w31, -a.v2, b.w23, a.w23, b.v2, -a.w31, b.v1, a.d, b.v3),
+          .d = dot(-a.v1, b.u1, a.u1, b.v1) + dot(-a.v2, b.u2, a.u2, b.v2) +
+               dot(-a.v3, b.u3, a.u3, b.v3),
           .u1 = dot(a.u1, b.d, a.u2, b.w12, -a.u3, b.w31, a.w31, b.u3, -a.w12, b.u2, -a.d, b.u1),
-          .u2 = dot(-a.u1, b.w12, a.u2, b.d, a.u3, b.w23, -a.w23, b.u3, a.w12, b.u1, -a.d, b.u2),
-          .u3 = dot(a.u1, b.w31, -a.u2, b.w23, a.u3, b.d, a.w23, b.u2, -a.w31, b.u1, -a.d, b.u3)};
+          .u2 = dot(a.u2, b.d, a.u3, b.w23, -a.u1, b.w12, a.w12, b.u1, -a.w23, b.u3, -a.d, b.u2),
+          .u3 = dot(a.u3, b.d, a.u1, b.w31, -a.u2, b.w23, a.w23, b.u2, -a.w31, b.u1, -a.d, b.u3)};
 }
 
 /// coadjoint: Rate Momentum -> Momentum
 /// ad*_w μ = [μ, w], so that (ad*_w μ)(b) = μ([w, b]).
-/// Cost: 60 mul, 50 add (40 fused).  Sparsity: 60 of 100 pairs of components.
+/// Cost: 60 mul, 50 add (39 fused).  Sparsity: 60 of 100 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so41::Momentum<S> coadjoint(
     const so41::Rate<S>& w, const so41::Momentum<S>& mu) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_mu_k1 = four(mu.k1, mu.k2, mu.k3, mu.k1);
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_w_u1 = four(w.u1, w.u2, w.u3, w.u1);
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto all_l23 = dot(-turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_w_w23),
+                               turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_w_w23),
+                               -turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_w_v1),
+                               turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_w_v1),
+                               -turned<3, 1, 2, 3>(three_mu_k1), turned<2, 3, 4, 2>(three_w_u1),
+                               turned<2, 3, 4, 2>(three_mu_k1), turned<3, 1, 2, 3>(three_w_u1));
+      const auto all_p1 = dot(four(mu.q), three_w_u1, -turned<3, 1, 2, 3>(three_mu_l23),
+                              turned<2, 3, 4, 2>(three_w_u1), turned<2, 3, 4, 2>(three_mu_l23),
+                              turned<3, 1, 2, 3>(three_w_u1), -turned<3, 1, 2, 3>(three_mu_p1),
+                              turned<2, 3, 4, 2>(three_w_w23), turned<2, 3, 4, 2>(three_mu_p1),
+                              turned<3, 1, 2, 3>(three_w_w23), three_mu_p1, four(w.d));
+      const auto all_k1 = dot(-four(mu.q), three_w_v1, -turned<3, 1, 2, 3>(three_mu_l23),
+                              turned<2, 3, 4, 2>(three_w_v1), turned<2, 3, 4, 2>(three_mu_l23),
+                              turned<3, 1, 2, 3>(three_w_v1), -turned<3, 1, 2, 3>(three_mu_k1),
+                              turned<2, 3, 4, 2>(three_w_w23), turned<2, 3, 4, 2>(three_mu_k1),
+                              turned<3, 1, 2, 3>(three_w_w23), -three_mu_k1, four(w.d));
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2],
+              .q = lanes::total(dot(-three_mu_p1, three_w_v1, three_mu_k1, three_w_u1)),
+              .k1 = all_k1[0],
+              .k2 = all_k1[1],
+              .k3 = all_k1[2]};
+    }
+  }
   return {
       .l23 =
           dot(-mu.l12, w.w31, mu.l31, w.w12, -mu.p3, w.v2, mu.p2, w.v3, -mu.k3, w.u2, mu.k2, w.u3),
       .l31 =
-          dot(mu.l12, w.w23, -mu.l23, w.w12, mu.p3, w.v1, -mu.p1, w.v3, mu.k3, w.u1, -mu.k1, w.u3),
+          dot(-mu.l23, w.w12, mu.l12, w.w23, -mu.p1, w.v3, mu.p3, w.v1, -mu.k1, w.u3, mu.k3, w.u1),
       .l12 =
           dot(-mu.l31, w.w23, mu.l23, w.w31, -mu.p2, w.v1, mu.p1, w.v2, -mu.k2, w.u1, mu.k1, w.u2),
       .p1 = dot(mu.q, w.u1, -mu.l12, w.u2, mu.l31, w.u3, -mu.p3, w.w31, mu.p2, w.w12, mu.p1, w.d),
-      .p2 = dot(mu.l12, w.u1, mu.q, w.u2, -mu.l23, w.u3, mu.p3, w.w23, -mu.p1, w.w12, mu.p2, w.d),
-      .p3 = dot(-mu.l31, w.u1, mu.l23, w.u2, mu.q, w.u3, -mu.p2, w.w23, mu.p1, w.w31, mu.p3, w.d),
-      .q = dot(-mu.p1, w.v1, -mu.p2, w.v2, -mu.p3, w.v3, mu.k1, w.u1, mu.k2, w.u2, mu.k3, w.u3),
+      .p2 = dot(mu.q, w.u2, -mu.l23, w.u3, mu.l12, w.u1, -mu.p1, w.w12, mu.p3, w.w23, mu.p2, w.d),
+      .p3 = dot(mu.q, w.u3, -mu.l31, w.u1, mu.l23, w.u2, -mu.p2, w.w23, mu.p1, w.w31, mu.p3, w.d),
+      .q = dot(-mu.p1, w.v1, mu.k1, w.u1) + dot(-mu.p2, w.v2, mu.k2, w.u2) +
+           dot(-mu.p3, w.v3, mu.k3, w.u3),
       .k1 = dot(-mu.q, w.v1, -mu.l12, w.v2, mu.l31, w.v3, -mu.k3, w.w31, mu.k2, w.w12, -mu.k1, w.d),
-      .k2 = dot(mu.l12, w.v1, -mu.q, w.v2, -mu.l23, w.v3, mu.k3, w.w23, -mu.k1, w.w12, -mu.k2, w.d),
+      .k2 = dot(-mu.q, w.v2, -mu.l23, w.v3, mu.l12, w.v1, -mu.k1, w.w12, mu.k3, w.w23, -mu.k2, w.d),
       .k3 =
-          dot(-mu.l31, w.v1, mu.l23, w.v2, -mu.q, w.v3, -mu.k2, w.w23, mu.k1, w.w31, -mu.k3, w.d)};
+          dot(-mu.q, w.v3, -mu.l31, w.v1, mu.l23, w.v2, -mu.k2, w.w23, mu.k1, w.w31, -mu.k3, w.d)};
 }
 
 /// kinematics: Versor Rate -> Versor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 136 mul, 112 add (72 fused).  Sparsity: 136 of 160 pairs of components.
+/// Cost: 136 mul, 112 add (70 fused).  Sparsity: 136 of 160 pairs of components.
 template <class S>
 [[nodiscard]] constexpr Versor<S> kinematics(const Versor<S>& m, const so41::Rate<S>& w) noexcept {
-  const S m_plus_s = m.s - m.e0i;
-  const S m_minus_s = m.s + m.e0i;
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) - turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s - m.e0i;
+      const S m_plus_e23 = three_m_plus_e12[1];
+      const S m_plus_e31 = three_m_plus_e12[2];
+      const S m_plus_e12 = three_m_plus_e12[0];
+      const S plus_s =
+          dot(m.e01, w.v1, m.e02, w.v2, m.e03, w.v3, S(0.5),
+              dot(-m_plus_s, w.d, m_plus_e12, w.w12, m_plus_e31, w.w31, m_plus_e23, w.w23));
+      const auto three_m_minus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s + m.e0i;
+      const S m_minus_e23 = three_m_minus_e12[1];
+      const S m_minus_e31 = three_m_minus_e12[2];
+      const S m_minus_e12 = three_m_minus_e12[0];
+      const S minus_s =
+          dot(m.e1i, w.u1, m.e2i, w.u2, m.e3i, w.u3, S(0.5),
+              dot(m_minus_s, w.d, m_minus_e12, w.w12, m_minus_e31, w.w31, m_minus_e23, w.w23));
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_plus_e23 =
+          dot(turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_w_v1), four(m.e0123),
+              three_w_v1, four(S(0.5)),
+              dot(-four(m_plus_s), three_w_w23, -three_m_plus_e12, turned<2, 3, 4, 2>(three_w_w23),
+                  turned<3, 1, 2, 3>(three_m_plus_e12), turned<3, 1, 2, 3>(three_w_w23),
+                  -turned<2, 3, 4, 2>(three_m_plus_e12), four(w.d)));
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_w_u1 = four(w.u1, w.u2, w.u3, w.u1);
+      const auto three_minus_e23 = dot(
+          turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_w_u1),
+          -turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_w_u1), four(m.e123i),
+          three_w_u1, four(S(0.5)),
+          dot(-four(m_minus_s), three_w_w23, -three_m_minus_e12, turned<2, 3, 4, 2>(three_w_w23),
+              turned<3, 1, 2, 3>(three_m_minus_e12), turned<3, 1, 2, 3>(three_w_w23),
+              turned<2, 3, 4, 2>(three_m_minus_e12), four(w.d)));
+      const auto all_e23 = four(S(0.5)) * (three_plus_e23 + three_minus_e23);
+      const auto all_e1i =
+          four(S(0.5)) * dot(-three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
+                             turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e1i),
+                             turned<2, 3, 4, 2>(three_w_w23), four(m.e123i), three_w_w23,
+                             -four(m_minus_s), three_w_v1, -three_m_minus_e12,
+                             turned<2, 3, 4, 2>(three_w_v1), turned<3, 1, 2, 3>(three_m_minus_e12),
+                             turned<3, 1, 2, 3>(three_w_v1));
+      const auto all_e023i = four(S(-0.5)) * (three_plus_e23 - three_minus_e23);
+      const auto all_e01 =
+          four(S(0.5)) * dot(three_m_e01, four(w.d), turned<2, 3, 4, 2>(three_m_e01),
+                             turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e01),
+                             turned<2, 3, 4, 2>(three_w_w23), four(m.e0123), three_w_w23,
+                             -four(m_plus_s), three_w_u1, -three_m_plus_e12,
+                             turned<2, 3, 4, 2>(three_w_u1), turned<3, 1, 2, 3>(three_m_plus_e12),
+                             turned<3, 1, 2, 3>(three_w_u1));
+      return {
+          .s = S(0.5) * (plus_s + minus_s),
+          .e23 = all_e23[0],
+          .e31 = all_e23[1],
+          .e12 = all_e23[2],
+          .e1i = all_e1i[0],
+          .e2i = all_e1i[1],
+          .e3i = all_e1i[2],
+          .e123i = S(0.5) * mul_add(-m.e123i, w.d,
+                                    lanes::total(dot(-three_m_e1i, three_w_w23, -three_m_minus_e12,
+                                                     turned<3, 1, 2, 3>(three_w_v1)))),
+          .e0i = S(-0.5) * (plus_s - minus_s),
+          .e023i = all_e023i[0],
+          .e031i = all_e023i[1],
+          .e012i = all_e023i[2],
+          .e01 = all_e01[0],
+          .e02 = all_e01[1],
+          .e03 = all_e01[2],
+          .e0123 = S(0.5) * mul_add(m.e0123, w.d,
+                                    lanes::total(dot(-three_m_e01, three_w_w23, -three_m_plus_e12,
+                                                     turned<3, 1, 2, 3>(three_w_u1))))};
+    }
+  }
   const S m_plus_e12 = m.e12 - m.e012i;
-  const S m_minus_e12 = m.e12 + m.e012i;
-  const S m_plus_e13 = -m.e31 + m.e031i;
-  const S m_minus_e13 = -m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 - m.e023i;
-  const S m_minus_e23 = m.e23 + m.e023i;
+  const S m_plus_e31 = m.e31 - m.e031i;
+  const S m_plus_s = m.s - m.e0i;
   const S plus_s =
       dot(m.e01, w.v1, m.e02, w.v2, m.e03, w.v3, S(0.5),
-          dot(-m_plus_s, w.d, m_plus_e12, w.w12, -m_plus_e13, w.w31, m_plus_e23, w.w23));
+          dot(-m_plus_s, w.d, m_plus_e12, w.w12, m_plus_e31, w.w31, m_plus_e23, w.w23));
+  const S m_minus_e12 = m.e12 + m.e012i;
+  const S m_minus_e23 = m.e23 + m.e023i;
+  const S m_minus_e31 = m.e31 + m.e031i;
+  const S m_minus_s = m.s + m.e0i;
   const S minus_s =
       dot(m.e1i, w.u1, m.e2i, w.u2, m.e3i, w.u3, S(0.5),
-          dot(m_minus_s, w.d, m_minus_e12, w.w12, -m_minus_e13, w.w31, m_minus_e23, w.w23));
+          dot(m_minus_s, w.d, m_minus_e12, w.w12, m_minus_e31, w.w31, m_minus_e23, w.w23));
   const S plus_e23 =
       dot(m.e02, w.v3, -m.e03, w.v2, m.e0123, w.v1, S(0.5),
-          dot(-m_plus_s, w.w23, -m_plus_e12, w.w31, -m_plus_e13, w.w12, -m_plus_e23, w.d));
-  const S minus_e23 =
-      dot(m.e2i, w.u3, -m.e3i, w.u2, m.e123i, w.u1, S(0.5),
-          dot(-m_minus_s, w.w23, -m_minus_e12, w.w31, -m_minus_e13, w.w12, m_minus_e23, w.d));
-  const S plus_e13 =
-      dot(m.e01, w.v3, -m.e03, w.v1, -m.e0123, w.v2, S(0.5),
-          dot(m_plus_s, w.w31, -m_plus_e12, w.w23, -m_plus_e13, w.d, m_plus_e23, w.w12));
-  const S minus_e13 =
-      dot(m.e1i, w.u3, -m.e3i, w.u1, -m.e123i, w.u2, S(0.5),
-          dot(m_minus_s, w.w31, -m_minus_e12, w.w23, m_minus_e13, w.d, m_minus_e23, w.w12));
+          dot(-m_plus_s, w.w23, -m_plus_e12, w.w31, m_plus_e31, w.w12, -m_plus_e23, w.d));
+  const S plus_e31 =
+      dot(m.e03, w.v1, -m.e01, w.v3, m.e0123, w.v2, S(0.5),
+          dot(-m_plus_s, w.w31, -m_plus_e23, w.w12, m_plus_e12, w.w23, -m_plus_e31, w.d));
   const S plus_e12 =
       dot(m.e01, w.v2, -m.e02, w.v1, m.e0123, w.v3, S(0.5),
-          dot(-m_plus_s, w.w12, -m_plus_e12, w.d, m_plus_e13, w.w23, m_plus_e23, w.w31));
+          dot(-m_plus_s, w.w12, -m_plus_e31, w.w23, m_plus_e23, w.w31, -m_plus_e12, w.d));
+  const S minus_e23 =
+      dot(m.e2i, w.u3, -m.e3i, w.u2, m.e123i, w.u1, S(0.5),
+          dot(-m_minus_s, w.w23, -m_minus_e12, w.w31, m_minus_e31, w.w12, m_minus_e23, w.d));
+  const S minus_e31 =
+      dot(m.e3i, w.u1, -m.e1i, w.u3, m.e123i, w.u2, S(0.5),
+          dot(-m_minus_s, w.w31, -m_minus_e23, w.w12, m_minus_e12, w.w23, m_minus_e31, w.d));
   const S minus_e12 =
       dot(m.e1i, w.u2, -m.e2i, w.u1, m.e123i, w.u3, S(0.5),
-          dot(-m_minus_s, w.w12, m_minus_e12, w.d, m_minus_e13, w.w23, m_minus_e23, w.w31));
+          dot(-m_minus_s, w.w12, -m_minus_e31, w.w23, m_minus_e23, w.w31, m_minus_e12, w.d));
   return {.s = S(0.5) * (plus_s + minus_s),
           .e23 = S(0.5) * (plus_e23 + minus_e23),
-          .e31 = S(-0.5) * (plus_e13 + minus_e13),
+          .e31 = S(0.5) * (plus_e31 + minus_e31),
           .e12 = S(0.5) * (plus_e12 + minus_e12),
           .e1i = S(0.5) * dot(-m.e1i, w.d, m.e2i, w.w12, -m.e3i, w.w31, m.e123i, w.w23, -m_minus_s,
-                              w.v1, -m_minus_e12, w.v2, -m_minus_e13, w.v3),
-          .e2i = S(0.5) * dot(-m.e1i, w.w12, -m.e2i, w.d, m.e3i, w.w23, m.e123i, w.w31, -m_minus_s,
-                              w.v2, m_minus_e12, w.v1, -m_minus_e23, w.v3),
-          .e3i = S(0.5) * dot(m.e1i, w.w31, -m.e2i, w.w23, -m.e3i, w.d, m.e123i, w.w12, -m_minus_s,
-                              w.v3, m_minus_e13, w.v1, m_minus_e23, w.v2),
-          .e123i = S(0.5) * dot(-m.e1i, w.w23, -m.e2i, w.w31, -m.e3i, w.w12, -m.e123i, w.d,
-                                -m_minus_e12, w.v3, m_minus_e13, w.v2, -m_minus_e23, w.v1),
+                              w.v1, -m_minus_e12, w.v2, m_minus_e31, w.v3),
+          .e2i = S(0.5) * dot(-m.e2i, w.d, m.e3i, w.w23, -m.e1i, w.w12, m.e123i, w.w31, -m_minus_s,
+                              w.v2, -m_minus_e23, w.v3, m_minus_e12, w.v1),
+          .e3i = S(0.5) * dot(-m.e3i, w.d, m.e1i, w.w31, -m.e2i, w.w23, m.e123i, w.w12, -m_minus_s,
+                              w.v3, -m_minus_e31, w.v1, m_minus_e23, w.v2),
+          .e123i = S(0.5) * mul_add(-m.e123i, w.d,
+                                    dot(-m.e1i, w.w23, -m_minus_e12, w.v3) +
+                                        dot(-m.e2i, w.w31, -m_minus_e23, w.v1) +
+                                        dot(-m.e3i, w.w12, -m_minus_e31, w.v2)),
           .e0i = S(-0.5) * (plus_s - minus_s),
           .e023i = S(-0.5) * (plus_e23 - minus_e23),
-          .e031i = S(0.5) * (plus_e13 - minus_e13),
+          .e031i = S(-0.5) * (plus_e31 - minus_e31),
           .e012i = S(-0.5) * (plus_e12 - minus_e12),
           .e01 = S(0.5) * dot(m.e01, w.d, m.e02, w.w12, -m.e03, w.w31, m.e0123, w.w23, -m_plus_s,
-                              w.u1, -m_plus_e12, w.u2, -m_plus_e13, w.u3),
-          .e02 = S(0.5) * dot(-m.e01, w.w12, m.e02, w.d, m.e03, w.w23, m.e0123, w.w31, -m_plus_s,
-                              w.u2, m_plus_e12, w.u1, -m_plus_e23, w.u3),
-          .e03 = S(0.5) * dot(m.e01, w.w31, -m.e02, w.w23, m.e03, w.d, m.e0123, w.w12, -m_plus_s,
-                              w.u3, m_plus_e13, w.u1, m_plus_e23, w.u2),
-          .e0123 = S(0.5) * dot(-m.e01, w.w23, -m.e02, w.w31, -m.e03, w.w12, m.e0123, w.d,
-                                -m_plus_e12, w.u3, m_plus_e13, w.u2, -m_plus_e23, w.u1)};
+                              w.u1, -m_plus_e12, w.u2, m_plus_e31, w.u3),
+          .e02 = S(0.5) * dot(m.e02, w.d, m.e03, w.w23, -m.e01, w.w12, m.e0123, w.w31, -m_plus_s,
+                              w.u2, -m_plus_e23, w.u3, m_plus_e12, w.u1),
+          .e03 = S(0.5) * dot(m.e03, w.d, m.e01, w.w31, -m.e02, w.w23, m.e0123, w.w12, -m_plus_s,
+                              w.u3, -m_plus_e31, w.u1, m_plus_e23, w.u2),
+          .e0123 = S(0.5) * mul_add(m.e0123, w.d,
+                                    dot(-m.e01, w.w23, -m_plus_e12, w.u3) +
+                                        dot(-m.e02, w.w31, -m_plus_e23, w.u1) +
+                                        dot(-m.e03, w.w12, -m_plus_e31, w.u2))};
 }
 
 /// Ad: Versor Rate -> Rate
 /// m w ~m: a body rate as a spatial rate.
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
-/// Cost: 198 mul, 187 add (140 fused).
+/// Cost: 198 mul, 187 add (139 fused).
 template <class S>
 [[nodiscard]] constexpr so41::Rate<S> Ad(const Versor<S>& m, const so41::Rate<S>& w) noexcept {
-  const S c_e01 =
-      dot(m.e31, w.u3, -m.e12, w.u2, m.e0i, w.u1, m.e01, w.d, m.e02, w.w12, -m.e03, w.w31);
-  const S c_e02 =
-      dot(-m.e23, w.u3, m.e12, w.u1, m.e0i, w.u2, -m.e01, w.w12, m.e02, w.d, m.e03, w.w23);
-  const S c_e12 =
-      dot(m.e23, w.w31, -m.e31, w.w23, m.e1i, w.u2, -m.e2i, w.u1, m.e01, w.v2, -m.e02, w.v1);
-  const S c_e03 =
-      dot(m.e23, w.u2, -m.e31, w.u1, m.e0i, w.u3, m.e01, w.w31, -m.e02, w.w23, m.e03, w.d);
-  const S c_e13 =
-      dot(m.e23, w.w12, -m.e12, w.w23, m.e1i, w.u3, -m.e3i, w.u1, m.e01, w.v3, -m.e03, w.v1);
-  const S c_e23 =
-      dot(m.e31, w.w12, -m.e12, w.w31, m.e2i, w.u3, -m.e3i, w.u2, m.e02, w.v3, -m.e03, w.v2);
-  const S c_e0123 = dot(m.e023i, w.u1, m.e031i, w.u2, m.e012i, w.u3, m.e0123, w.d);
-  const S c_e0i =
-      dot(m.e1i, w.u1, m.e2i, w.u2, m.e3i, w.u3, -m.e01, w.v1, -m.e02, w.v2, -m.e03, w.v3);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_c_e1i =
+          dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_v1), -four(m.e0i),
+              three_w_v1, -three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
+              turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(three_w_w23));
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_w_u1 = four(w.u1, w.u2, w.u3, w.u1);
+      const auto three_c_e01 = dot(
+          turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_u1),
+          -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_u1), four(m.e0i), three_w_u1,
+          three_m_e01, four(w.d), turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_w_w23),
+          -turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_w_w23));
+      const S c_e0i = lanes::total(dot(three_m_e1i, three_w_u1, -three_m_e01, three_w_v1));
+      const auto three_c_e12 =
+          dot(three_m_e23, turned<2, 3, 4, 2>(three_w_w23), -turned<2, 3, 4, 2>(three_m_e23),
+              three_w_w23, three_m_e1i, turned<2, 3, 4, 2>(three_w_u1),
+              -turned<2, 3, 4, 2>(three_m_e1i), three_w_u1, three_m_e01,
+              turned<2, 3, 4, 2>(three_w_v1), -turned<2, 3, 4, 2>(three_m_e01), three_w_v1);
+      const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
+      const S c_e0123 = dot(m.e023i, w.u1, m.e031i, w.u2, m.e012i, w.u3, m.e0123, w.d);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e012i =
+          dot(three_m_e023i, turned<2, 3, 4, 2>(three_w_w23), -turned<2, 3, 4, 2>(three_m_e023i),
+              three_w_w23, four(m.e123i), turned<3, 1, 2, 3>(three_w_u1), -four(m.e0123),
+              turned<3, 1, 2, 3>(three_w_v1));
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const auto all_w23 = mul_add(
+          four(S(2)),
+          dot(-three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e012i),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
+              -four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, three_c_e12,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e12),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(three_c_e12), four(m.s),
+              -four(c_e0i), three_m_e023i, three_c_e01, four(m.e123i),
+              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), three_c_e1i,
+              four(m.e0123), -turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
+              turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01)),
+          three_w_w23);
+      const auto all_v1 =
+          mul_add(four(S(2)),
+                  dot(three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), four(c_e0i), three_m_e1i, -three_c_e1i,
+                      four(m_plus_s), -turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
+                      turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  three_w_v1);
+      const S c_e3i = three_c_e1i[2];
+      const S c_e2i = three_c_e1i[1];
+      const S c_e1i = three_c_e1i[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      const S c_e23 = three_c_e12[1];
+      const S c_e31 = three_c_e12[2];
+      const S c_e12 = three_c_e12[0];
+      const S c_e023i = three_c_e012i[1];
+      const S c_e031i = three_c_e012i[2];
+      const S c_e012i = three_c_e012i[0];
+      const auto all_u1 = mul_add(
+          four(S(2)),
+          dot(three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), four(c_e0123),
+              turned<2, 3, 4, 2>(three_m_minus_e12), -four(c_e0i), three_m_e01, -three_c_e01,
+              four(m_minus_s), turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
+              -turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+          three_w_u1);
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2],
+              .d = mul_add(S(2),
+                           dot(c_e012i, m.e12, c_e031i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i,
+                               -c_e123i, m.e0123, -c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i,
+                               c_e0i, m.s, -c_e01, m.e1i, -c_e02, m.e2i, -c_e03, m.e3i, c_e1i,
+                               m.e01, c_e2i, m.e02, c_e3i, m.e03),
+                           w.d),
+              .u1 = all_u1[0],
+              .u2 = all_u1[1],
+              .u3 = all_u1[2]};
+    }
+  }
   const S c_e1i =
       dot(m.e31, w.v3, -m.e12, w.v2, -m.e0i, w.v1, -m.e1i, w.d, m.e2i, w.w12, -m.e3i, w.w31);
   const S c_e2i =
-      dot(-m.e23, w.v3, m.e12, w.v1, -m.e0i, w.v2, -m.e1i, w.w12, -m.e2i, w.d, m.e3i, w.w23);
-  const S c_e012i = dot(m.e023i, w.w31, -m.e031i, w.w23, m.e123i, w.u3, -m.e0123, w.v3);
+      dot(m.e12, w.v1, -m.e23, w.v3, -m.e0i, w.v2, -m.e2i, w.d, m.e3i, w.w23, -m.e1i, w.w12);
   const S c_e3i =
-      dot(m.e23, w.v2, -m.e31, w.v1, -m.e0i, w.v3, m.e1i, w.w31, -m.e2i, w.w23, -m.e3i, w.d);
-  const S c_e013i = dot(m.e023i, w.w12, -m.e012i, w.w23, -m.e123i, w.u2, m.e0123, w.v2);
-  const S c_e023i = dot(m.e031i, w.w12, -m.e012i, w.w31, m.e123i, w.u1, -m.e0123, w.v1);
+      dot(m.e23, w.v2, -m.e31, w.v1, -m.e0i, w.v3, -m.e3i, w.d, m.e1i, w.w31, -m.e2i, w.w23);
+  const S c_e01 =
+      dot(m.e31, w.u3, -m.e12, w.u2, m.e0i, w.u1, m.e01, w.d, m.e02, w.w12, -m.e03, w.w31);
+  const S c_e02 =
+      dot(m.e12, w.u1, -m.e23, w.u3, m.e0i, w.u2, m.e02, w.d, m.e03, w.w23, -m.e01, w.w12);
+  const S c_e03 =
+      dot(m.e23, w.u2, -m.e31, w.u1, m.e0i, w.u3, m.e03, w.d, m.e01, w.w31, -m.e02, w.w23);
+  const S c_e0i = dot(m.e1i, w.u1, -m.e01, w.v1) + dot(m.e2i, w.u2, -m.e02, w.v2) +
+                  dot(m.e3i, w.u3, -m.e03, w.v3);
+  const S c_e12 =
+      dot(m.e23, w.w31, -m.e31, w.w23, m.e1i, w.u2, -m.e2i, w.u1, m.e01, w.v2, -m.e02, w.v1);
+  const S c_e23 =
+      dot(m.e31, w.w12, -m.e12, w.w31, m.e2i, w.u3, -m.e3i, w.u2, m.e02, w.v3, -m.e03, w.v2);
+  const S c_e31 =
+      dot(m.e12, w.w23, -m.e23, w.w12, m.e3i, w.u1, -m.e1i, w.u3, m.e03, w.v1, -m.e01, w.v3);
   const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
-  const S c_plus_e12 = -c_e012i + c_e12;
-  const S c_minus_e12 = c_e012i + c_e12;
-  const S c_plus_e13 = -c_e013i + c_e13;
-  const S c_minus_e13 = c_e013i + c_e13;
-  const S c_plus_e23 = -c_e023i + c_e23;
-  const S c_minus_e23 = c_e023i + c_e23;
-  const S m_plus_s = m.s + m.e0i;
-  const S m_minus_s = m.s - m.e0i;
+  const S c_e0123 = dot(m.e023i, w.u1, m.e031i, w.u2, m.e012i, w.u3, m.e0123, w.d);
+  const S c_e012i = dot(m.e023i, w.w31, -m.e031i, w.w23, m.e123i, w.u3, -m.e0123, w.v3);
+  const S c_e023i = dot(m.e031i, w.w12, -m.e012i, w.w31, m.e123i, w.u1, -m.e0123, w.v1);
+  const S c_e031i = dot(m.e012i, w.w23, -m.e023i, w.w12, m.e123i, w.u2, -m.e0123, w.v2);
   const S m_plus_e12 = m.e12 + m.e012i;
-  const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
   const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S m_plus_s = m.s + m.e0i;
+  const S c_minus_e12 = c_e012i + c_e12;
+  const S c_minus_e23 = c_e023i + c_e23;
+  const S c_minus_e31 = c_e031i + c_e31;
+  const S m_minus_e12 = -m.e12 + m.e012i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S m_minus_s = m.s - m.e0i;
+  const S c_plus_e12 = -c_e012i + c_e12;
+  const S c_plus_e23 = -c_e023i + c_e23;
+  const S c_plus_e31 = -c_e031i + c_e31;
   return {.w23 = mul_add(
               S(2),
-              dot(-c_e012i, m.e031i, -c_e013i, m.e012i, c_e023i, m.e0i, -c_e0123, m.e1i, c_e123i,
-                  m.e01, c_e12, m.e31, c_e13, m.e12, -c_e23, m.s, -c_e0i, m.e023i, c_e01, m.e123i,
+              dot(-c_e012i, m.e031i, c_e031i, m.e012i, c_e023i, m.e0i, -c_e0123, m.e1i, c_e123i,
+                  m.e01, c_e12, m.e31, -c_e31, m.e12, -c_e23, m.s, -c_e0i, m.e023i, c_e01, m.e123i,
                   -c_e02, m.e3i, c_e03, m.e2i, c_e1i, m.e0123, -c_e2i, m.e03, c_e3i, m.e02),
               w.w23),
           .w31 = mul_add(
               S(2),
-              dot(c_e012i, m.e023i, -c_e013i, m.e0i, -c_e023i, m.e012i, -c_e0123, m.e2i, c_e123i,
-                  m.e02, -c_e12, m.e23, c_e13, m.s, c_e23, m.e12, -c_e0i, m.e031i, c_e01, m.e3i,
-                  c_e02, m.e123i, -c_e03, m.e1i, c_e1i, m.e03, c_e2i, m.e0123, -c_e3i, m.e01),
+              dot(-c_e023i, m.e012i, c_e012i, m.e023i, c_e031i, m.e0i, -c_e0123, m.e2i, c_e123i,
+                  m.e02, c_e23, m.e12, -c_e12, m.e23, -c_e31, m.s, -c_e0i, m.e031i, c_e02, m.e123i,
+                  -c_e03, m.e1i, c_e01, m.e3i, c_e2i, m.e0123, -c_e3i, m.e01, c_e1i, m.e03),
               w.w31),
           .w12 = mul_add(
               S(2),
-              dot(c_e012i, m.e0i, c_e013i, m.e023i, c_e023i, m.e031i, -c_e0123, m.e3i, c_e123i,
-                  m.e03, -c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31, -c_e0i, m.e012i, -c_e01, m.e2i,
-                  c_e02, m.e1i, c_e03, m.e123i, -c_e1i, m.e02, c_e2i, m.e01, c_e3i, m.e0123),
+              dot(-c_e031i, m.e023i, c_e023i, m.e031i, c_e012i, m.e0i, -c_e0123, m.e3i, c_e123i,
+                  m.e03, c_e31, m.e23, -c_e23, m.e31, -c_e12, m.s, -c_e0i, m.e012i, c_e03, m.e123i,
+                  -c_e01, m.e2i, c_e02, m.e1i, c_e3i, m.e0123, -c_e1i, m.e02, c_e2i, m.e01),
               w.w12),
-          .v1 = mul_add(
-              S(2),
-              dot(c_minus_e12, m.e2i, c_minus_e13, m.e3i, c_minus_e23, m.e123i, c_e123i, m_plus_e23,
-                  c_e0i, m.e1i, -c_e1i, m_plus_s, -c_e2i, m_plus_e12, c_e3i, m_plus_e13),
-              w.v1),
+          .v1 = mul_add(S(2),
+                        dot(c_minus_e12, m.e2i, -c_minus_e31, m.e3i, c_minus_e23, m.e123i, c_e123i,
+                            m_plus_e23, c_e0i, m.e1i, -c_e1i, m_plus_s, -c_e2i, m_plus_e12, c_e3i,
+                            m_plus_e13),
+                        w.v1),
           .v2 = mul_add(S(2),
-                        dot(-c_minus_e12, m.e1i, -c_minus_e13, m.e123i, c_minus_e23, m.e3i, c_e123i,
-                            m_plus_e13, c_e0i, m.e2i, c_e1i, m_plus_e12, -c_e2i, m_plus_s, -c_e3i,
-                            m_plus_e23),
+                        dot(c_minus_e23, m.e3i, -c_minus_e12, m.e1i, c_minus_e31, m.e123i, c_e123i,
+                            m_plus_e13, c_e0i, m.e2i, -c_e2i, m_plus_s, -c_e3i, m_plus_e23, c_e1i,
+                            m_plus_e12),
                         w.v2),
           .v3 = mul_add(S(2),
-                        dot(c_minus_e12, m.e123i, -c_minus_e13, m.e1i, -c_minus_e23, m.e2i, c_e123i,
-                            m_plus_e12, c_e0i, m.e3i, -c_e1i, m_plus_e13, c_e2i, m_plus_e23, -c_e3i,
-                            m_plus_s),
+                        dot(c_minus_e31, m.e1i, -c_minus_e23, m.e2i, c_minus_e12, m.e123i, c_e123i,
+                            m_plus_e12, c_e0i, m.e3i, -c_e3i, m_plus_s, -c_e1i, m_plus_e13, c_e2i,
+                            m_plus_e23),
                         w.v3),
           .d = mul_add(
               S(2),
-              dot(c_e012i, m.e12, -c_e013i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i, -c_e123i,
-                  m.e0123, -c_e12, m.e012i, c_e13, m.e031i, -c_e23, m.e023i, c_e0i, m.s, -c_e01,
+              dot(c_e012i, m.e12, c_e031i, m.e31, c_e023i, m.e23, -c_e0123, m.e123i, -c_e123i,
+                  m.e0123, -c_e12, m.e012i, -c_e31, m.e031i, -c_e23, m.e023i, c_e0i, m.s, -c_e01,
                   m.e1i, -c_e02, m.e2i, -c_e03, m.e3i, c_e1i, m.e01, c_e2i, m.e02, c_e3i, m.e03),
               w.d),
           .u1 = mul_add(
               S(2),
-              dot(c_plus_e12, m.e02, c_plus_e13, m.e03, c_plus_e23, m.e0123, c_e0123, m_minus_e23,
-                  -c_e0i, m.e01, -c_e01, m_minus_s, c_e02, m_minus_e12, c_e03, m_minus_e13),
+              dot(c_plus_e12, m.e02, -c_plus_e31, m.e03, c_plus_e23, m.e0123, c_e0123, m_minus_e23,
+                  -c_e0i, m.e01, -c_e01, m_minus_s, c_e02, m_minus_e12, -c_e03, m_minus_e31),
               w.u1),
-          .u2 = mul_add(S(2),
-                        dot(-c_plus_e12, m.e01, -c_plus_e13, m.e0123, c_plus_e23, m.e03, -c_e0123,
-                            m_minus_e13, -c_e0i, m.e02, -c_e01, m_minus_e12, -c_e02, m_minus_s,
-                            c_e03, m_minus_e23),
-                        w.u2),
+          .u2 = mul_add(
+              S(2),
+              dot(c_plus_e23, m.e03, -c_plus_e12, m.e01, c_plus_e31, m.e0123, c_e0123, m_minus_e31,
+                  -c_e0i, m.e02, -c_e02, m_minus_s, c_e03, m_minus_e23, -c_e01, m_minus_e12),
+              w.u2),
           .u3 = mul_add(
               S(2),
-              dot(c_plus_e12, m.e0123, -c_plus_e13, m.e01, -c_plus_e23, m.e02, c_e0123, m_minus_e12,
-                  -c_e0i, m.e03, -c_e01, m_minus_e13, -c_e02, m_minus_e23, -c_e03, m_minus_s),
+              dot(c_plus_e31, m.e01, -c_plus_e23, m.e02, c_plus_e12, m.e0123, c_e0123, m_minus_e12,
+                  -c_e0i, m.e03, -c_e03, m_minus_s, c_e01, m_minus_e31, -c_e02, m_minus_e23),
               w.u3)};
 }
 
 /// Ad_star_inverse: Versor Momentum -> Momentum
 /// m μ ~m: a body momentum as a spatial momentum; Ad_star(m, μ) = Ad_star_inverse(~m, μ).
 /// Needs M ~M = 1: computed as X + 2 (M × X) ~M multiplied out in A P±, P± = ½(1 ± e0∧ei/e0·ei).
-/// Cost: 198 mul, 187 add (140 fused).
+/// Cost: 198 mul, 187 add (139 fused).
 template <class S>
 [[nodiscard]] constexpr so41::Momentum<S> Ad_star_inverse(const Versor<S>& m,
                                                           const so41::Momentum<S>& mu) noexcept {
-  const S c_e0 = dot(-m.e023i, mu.p1, -m.e031i, mu.p2, -m.e012i, mu.p3, m.e0123, mu.q);
-  const S c_e1 = dot(-m.e031i, mu.l12, m.e012i, mu.l31, -m.e123i, mu.p1, m.e0123, mu.k1);
-  const S c_e2 = dot(m.e023i, mu.l12, -m.e012i, mu.l23, -m.e123i, mu.p2, m.e0123, mu.k2);
+  if constexpr (lanes::packed<S>) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_mu_k1 = four(mu.k1, mu.k2, mu.k3, mu.k1);
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_c_e12i =
+          dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_k1), -turned<2, 3, 4, 2>(three_m_e23),
+              three_mu_k1, -four(m.e0i), turned<3, 1, 2, 3>(three_mu_k1), three_m_e1i,
+              turned<2, 3, 4, 2>(three_mu_l23), -turned<2, 3, 4, 2>(three_m_e1i), three_mu_l23,
+              turned<3, 1, 2, 3>(three_m_e1i), four(mu.q));
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_c_e012 =
+          dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_p1), -turned<2, 3, 4, 2>(three_m_e23),
+              three_mu_p1, four(m.e0i), turned<3, 1, 2, 3>(three_mu_p1), three_m_e01,
+              turned<2, 3, 4, 2>(three_mu_l23), -turned<2, 3, 4, 2>(three_m_e01), three_mu_l23,
+              -turned<3, 1, 2, 3>(three_m_e01), four(mu.q));
+      const S c_e123 = lanes::total(dot(three_m_e1i, three_mu_p1, -three_m_e01, three_mu_k1));
+      const auto three_c_e01i =
+          dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_mu_l23),
+              -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_mu_l23),
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_mu_p1),
+              -turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_mu_p1),
+              turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_mu_k1),
+              -turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_mu_k1));
+      const S c_ei = dot(m.e023i, mu.k1, m.e031i, mu.k2, m.e012i, mu.k3, -m.e123i, mu.q);
+      const S c_e0 = dot(-m.e023i, mu.p1, -m.e031i, mu.p2, -m.e012i, mu.p3, m.e0123, mu.q);
+      const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
+      const auto three_c_e1 =
+          dot(-turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_mu_l23),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_mu_l23), -four(m.e123i),
+              three_mu_p1, four(m.e0123), three_mu_k1);
+      const S m_minus_s = m.s - m.e0i;
+      const auto three_m_minus_e12 =
+          -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
+      const S m_plus_s = m.s + m.e0i;
+      const auto three_m_plus_e12 =
+          turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
+      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto all_l23 = mul_add(
+          four(S(2)),
+          dot(-three_c_e1, four(m.e0i), -turned<2, 3, 4, 2>(three_c_e1),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e1),
+              turned<2, 3, 4, 2>(three_m_e023i), four(c_e0), three_m_e1i, four(c_ei), three_m_e01,
+              -three_c_e01i, four(m.s), -turned<2, 3, 4, 2>(three_c_e01i),
+              turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(three_c_e01i),
+              turned<2, 3, 4, 2>(three_m_e23), -four(c_e123), three_m_e023i, three_c_e012,
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e012),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
+              three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(three_c_e12i),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123)),
+          three_mu_l23);
+      const auto all_p1 = mul_add(
+          four(S(2)),
+          dot(three_c_plus_e1, four(m.e0123), -turned<2, 3, 4, 2>(three_c_plus_e1),
+              turned<3, 1, 2, 3>(three_m_e01), turned<3, 1, 2, 3>(three_c_plus_e1),
+              turned<2, 3, 4, 2>(three_m_e01), -four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
+              -four(c_e123), three_m_e01, -three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
+              turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
+              -turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          three_mu_p1);
+      const S c_e23i = three_c_e12i[1];
+      const S c_e31i = three_c_e12i[2];
+      const S c_e12i = three_c_e12i[0];
+      const S c_e023 = three_c_e012[1];
+      const S c_e031 = three_c_e012[2];
+      const S c_e012 = three_c_e012[0];
+      const S c_e03i = three_c_e01i[2];
+      const S c_e02i = three_c_e01i[1];
+      const S c_e01i = three_c_e01i[0];
+      const S c_e3 = three_c_e1[2];
+      const S c_e2 = three_c_e1[1];
+      const S c_e1 = three_c_e1[0];
+      const auto all_k1 =
+          mul_add(four(S(2)),
+                  dot(-three_c_minus_e1, four(m.e123i), turned<2, 3, 4, 2>(three_c_minus_e1),
+                      turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_minus_e1),
+                      turned<2, 3, 4, 2>(three_m_e1i), four(c_ei),
+                      turned<2, 3, 4, 2>(three_m_plus_e12), four(c_e123), three_m_e1i, three_c_e12i,
+                      turned<3, 1, 2, 3>(three_m_plus_e12), -turned<3, 1, 2, 3>(three_c_e12i),
+                      three_m_plus_e12, -turned<2, 3, 4, 2>(three_c_e12i), four(m_plus_s)),
+                  three_mu_k1);
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2],
+              .q = mul_add(
+                  S(2),
+                  dot(c_e1, m.e23, c_e2, m.e31, c_e3, m.e12, -c_e0, m.e123i, c_ei, m.e0123, c_e01i,
+                      m.e023i, c_e02i, m.e031i, c_e03i, m.e012i, -c_e123, m.s, c_e012, m.e3i,
+                      c_e031, m.e2i, c_e023, m.e1i, -c_e12i, m.e03, -c_e31i, m.e02, -c_e23i, m.e01),
+                  mu.q),
+              .k1 = all_k1[0],
+              .k2 = all_k1[1],
+              .k3 = all_k1[2]};
+    }
+  }
+  const S c_e12i =
+      dot(m.e23, mu.k2, -m.e31, mu.k1, -m.e0i, mu.k3, m.e1i, mu.l31, -m.e2i, mu.l23, m.e3i, mu.q);
+  const S c_e23i =
+      dot(m.e31, mu.k3, -m.e12, mu.k2, -m.e0i, mu.k1, m.e2i, mu.l12, -m.e3i, mu.l31, m.e1i, mu.q);
+  const S c_e31i =
+      dot(m.e12, mu.k1, -m.e23, mu.k3, -m.e0i, mu.k2, m.e3i, mu.l23, -m.e1i, mu.l12, m.e2i, mu.q);
   const S c_e012 =
       dot(m.e23, mu.p2, -m.e31, mu.p1, m.e0i, mu.p3, m.e01, mu.l31, -m.e02, mu.l23, -m.e03, mu.q);
-  const S c_e3 = dot(-m.e023i, mu.l31, m.e031i, mu.l23, -m.e123i, mu.p3, m.e0123, mu.k3);
-  const S c_e013 =
-      dot(m.e23, mu.p3, -m.e12, mu.p1, -m.e0i, mu.p2, m.e01, mu.l12, m.e02, mu.q, -m.e03, mu.l23);
   const S c_e023 =
-      dot(m.e31, mu.p3, -m.e12, mu.p2, m.e0i, mu.p1, -m.e01, mu.q, m.e02, mu.l12, -m.e03, mu.l31);
-  const S c_e123 =
-      dot(m.e1i, mu.p1, m.e2i, mu.p2, m.e3i, mu.p3, -m.e01, mu.k1, -m.e02, mu.k2, -m.e03, mu.k3);
-  const S c_ei = dot(m.e023i, mu.k1, m.e031i, mu.k2, m.e012i, mu.k3, -m.e123i, mu.q);
+      dot(m.e31, mu.p3, -m.e12, mu.p2, m.e0i, mu.p1, m.e02, mu.l12, -m.e03, mu.l31, -m.e01, mu.q);
+  const S c_e031 =
+      dot(m.e12, mu.p1, -m.e23, mu.p3, m.e0i, mu.p2, m.e03, mu.l23, -m.e01, mu.l12, -m.e02, mu.q);
+  const S c_e123 = dot(m.e1i, mu.p1, -m.e01, mu.k1) + dot(m.e2i, mu.p2, -m.e02, mu.k2) +
+                   dot(m.e3i, mu.p3, -m.e03, mu.k3);
   const S c_e01i =
       dot(m.e31, mu.l12, -m.e12, mu.l31, m.e2i, mu.p3, -m.e3i, mu.p2, m.e02, mu.k3, -m.e03, mu.k2);
   const S c_e02i =
-      dot(-m.e23, mu.l12, m.e12, mu.l23, -m.e1i, mu.p3, m.e3i, mu.p1, -m.e01, mu.k3, m.e03, mu.k1);
-  const S c_e12i =
-      dot(m.e23, mu.k2, -m.e31, mu.k1, -m.e0i, mu.k3, m.e1i, mu.l31, -m.e2i, mu.l23, m.e3i, mu.q);
+      dot(m.e12, mu.l23, -m.e23, mu.l12, m.e3i, mu.p1, -m.e1i, mu.p3, m.e03, mu.k1, -m.e01, mu.k3);
   const S c_e03i =
       dot(m.e23, mu.l31, -m.e31, mu.l23, m.e1i, mu.p2, -m.e2i, mu.p1, m.e01, mu.k2, -m.e02, mu.k1);
-  const S c_e13i =
-      dot(m.e23, mu.k3, -m.e12, mu.k1, m.e0i, mu.k2, m.e1i, mu.l12, -m.e2i, mu.q, -m.e3i, mu.l23);
-  const S c_e23i =
-      dot(m.e31, mu.k3, -m.e12, mu.k2, -m.e0i, mu.k1, m.e1i, mu.q, m.e2i, mu.l12, -m.e3i, mu.l31);
-  const S c_plus_e1 = c_e1 + c_e01i;
-  const S c_minus_e1 = c_e1 - c_e01i;
-  const S c_plus_e2 = c_e2 + c_e02i;
-  const S c_minus_e2 = c_e2 - c_e02i;
-  const S c_plus_e3 = c_e3 + c_e03i;
-  const S c_minus_e3 = c_e3 - c_e03i;
-  const S m_plus_s = m.s + m.e0i;
+  const S c_ei = dot(m.e023i, mu.k1, m.e031i, mu.k2, m.e012i, mu.k3, -m.e123i, mu.q);
+  const S c_e0 = dot(-m.e023i, mu.p1, -m.e031i, mu.p2, -m.e012i, mu.p3, m.e0123, mu.q);
+  const S c_e1 = dot(-m.e031i, mu.l12, m.e012i, mu.l31, -m.e123i, mu.p1, m.e0123, mu.k1);
+  const S c_e2 = dot(-m.e012i, mu.l23, m.e023i, mu.l12, -m.e123i, mu.p2, m.e0123, mu.k2);
+  const S c_e3 = dot(-m.e023i, mu.l31, m.e031i, mu.l23, -m.e123i, mu.p3, m.e0123, mu.k3);
   const S m_minus_s = m.s - m.e0i;
-  const S m_plus_e12 = m.e12 + m.e012i;
   const S m_minus_e12 = -m.e12 + m.e012i;
-  const S m_plus_e13 = m.e31 + m.e031i;
-  const S m_minus_e13 = m.e31 - m.e031i;
-  const S m_plus_e23 = m.e23 + m.e023i;
   const S m_minus_e23 = -m.e23 + m.e023i;
+  const S m_minus_e31 = -m.e31 + m.e031i;
+  const S c_plus_e1 = c_e1 + c_e01i;
+  const S c_plus_e2 = c_e2 + c_e02i;
+  const S c_plus_e3 = c_e3 + c_e03i;
+  const S m_plus_s = m.s + m.e0i;
+  const S m_plus_e12 = m.e12 + m.e012i;
+  const S m_plus_e23 = m.e23 + m.e023i;
+  const S m_plus_e13 = m.e31 + m.e031i;
+  const S c_minus_e1 = c_e1 - c_e01i;
+  const S c_minus_e2 = c_e2 - c_e02i;
+  const S c_minus_e3 = c_e3 - c_e03i;
   return {
       .l23 = mul_add(
           S(2),
           dot(-c_e1, m.e0i, -c_e2, m.e012i, c_e3, m.e031i, c_e0, m.e1i, c_ei, m.e01, -c_e01i, m.s,
-              -c_e02i, m.e12, c_e03i, m.e31, -c_e123, m.e023i, c_e012, m.e2i, c_e013, m.e3i, c_e023,
-              m.e123i, c_e12i, m.e02, c_e13i, m.e03, c_e23i, m.e0123),
+              -c_e02i, m.e12, c_e03i, m.e31, -c_e123, m.e023i, c_e012, m.e2i, -c_e031, m.e3i,
+              c_e023, m.e123i, c_e12i, m.e02, -c_e31i, m.e03, c_e23i, m.e0123),
           mu.l23),
       .l31 = mul_add(
           S(2),
-          dot(c_e1, m.e012i, -c_e2, m.e0i, -c_e3, m.e023i, c_e0, m.e2i, c_ei, m.e02, c_e01i, m.e12,
-              -c_e02i, m.s, -c_e03i, m.e23, -c_e123, m.e031i, -c_e012, m.e1i, -c_e013, m.e123i,
-              c_e023, m.e3i, -c_e12i, m.e01, -c_e13i, m.e0123, c_e23i, m.e03),
+          dot(-c_e2, m.e0i, -c_e3, m.e023i, c_e1, m.e012i, c_e0, m.e2i, c_ei, m.e02, -c_e02i, m.s,
+              -c_e03i, m.e23, c_e01i, m.e12, -c_e123, m.e031i, c_e023, m.e3i, -c_e012, m.e1i,
+              c_e031, m.e123i, c_e23i, m.e03, -c_e12i, m.e01, c_e31i, m.e0123),
           mu.l31),
       .l12 = mul_add(
           S(2),
-          dot(-c_e1, m.e031i, c_e2, m.e023i, -c_e3, m.e0i, c_e0, m.e3i, c_ei, m.e03, -c_e01i, m.e31,
-              c_e02i, m.e23, -c_e03i, m.s, -c_e123, m.e012i, c_e012, m.e123i, -c_e013, m.e1i,
-              -c_e023, m.e2i, c_e12i, m.e0123, -c_e13i, m.e01, -c_e23i, m.e02),
+          dot(-c_e3, m.e0i, -c_e1, m.e031i, c_e2, m.e023i, c_e0, m.e3i, c_ei, m.e03, -c_e03i, m.s,
+              -c_e01i, m.e31, c_e02i, m.e23, -c_e123, m.e012i, c_e031, m.e1i, -c_e023, m.e2i,
+              c_e012, m.e123i, c_e31i, m.e01, -c_e23i, m.e02, c_e12i, m.e0123),
           mu.l12),
       .p1 = mul_add(
           S(2),
           dot(c_plus_e1, m.e0123, -c_plus_e2, m.e03, c_plus_e3, m.e02, -c_e0, m_minus_e23, -c_e123,
-              m.e01, c_e012, m_minus_e13, -c_e013, m_minus_e12, -c_e023, m_minus_s),
+              m.e01, -c_e012, m_minus_e31, c_e031, m_minus_e12, -c_e023, m_minus_s),
           mu.p1),
-      .p2 =
-          mul_add(S(2),
-                  dot(c_plus_e1, m.e03, c_plus_e2, m.e0123, -c_plus_e3, m.e01, c_e0, m_minus_e13,
-                      -c_e123, m.e02, c_e012, m_minus_e23, c_e013, m_minus_s, -c_e023, m_minus_e12),
-                  mu.p2),
+      .p2 = mul_add(
+          S(2),
+          dot(c_plus_e2, m.e0123, -c_plus_e3, m.e01, c_plus_e1, m.e03, -c_e0, m_minus_e31, -c_e123,
+              m.e02, -c_e023, m_minus_e12, c_e012, m_minus_e23, -c_e031, m_minus_s),
+          mu.p2),
       .p3 = mul_add(
           S(2),
-          dot(-c_plus_e1, m.e02, c_plus_e2, m.e01, c_plus_e3, m.e0123, -c_e0, m_minus_e12, -c_e123,
-              m.e03, -c_e012, m_minus_s, c_e013, m_minus_e23, -c_e023, m_minus_e13),
+          dot(c_plus_e3, m.e0123, -c_plus_e1, m.e02, c_plus_e2, m.e01, -c_e0, m_minus_e12, -c_e123,
+              m.e03, -c_e031, m_minus_e23, c_e023, m_minus_e31, -c_e012, m_minus_s),
           mu.p3),
       .q =
           mul_add(S(2),
                   dot(c_e1, m.e23, c_e2, m.e31, c_e3, m.e12, -c_e0, m.e123i, c_ei, m.e0123, c_e01i,
                       m.e023i, c_e02i, m.e031i, c_e03i, m.e012i, -c_e123, m.s, c_e012, m.e3i,
-                      -c_e013, m.e2i, c_e023, m.e1i, -c_e12i, m.e03, c_e13i, m.e02, -c_e23i, m.e01),
+                      c_e031, m.e2i, c_e023, m.e1i, -c_e12i, m.e03, -c_e31i, m.e02, -c_e23i, m.e01),
                   mu.q),
       .k1 =
           mul_add(S(2),
                   dot(-c_minus_e1, m.e123i, c_minus_e2, m.e3i, -c_minus_e3, m.e2i, c_ei, m_plus_e23,
-                      c_e123, m.e1i, c_e12i, m_plus_e13, c_e13i, m_plus_e12, -c_e23i, m_plus_s),
+                      c_e123, m.e1i, c_e12i, m_plus_e13, -c_e31i, m_plus_e12, -c_e23i, m_plus_s),
                   mu.k1),
       .k2 =
           mul_add(S(2),
-                  dot(-c_minus_e1, m.e3i, -c_minus_e2, m.e123i, c_minus_e3, m.e1i, c_ei, m_plus_e13,
-                      c_e123, m.e2i, -c_e12i, m_plus_e23, c_e13i, m_plus_s, c_e23i, m_plus_e12),
+                  dot(-c_minus_e2, m.e123i, c_minus_e3, m.e1i, -c_minus_e1, m.e3i, c_ei, m_plus_e13,
+                      c_e123, m.e2i, c_e23i, m_plus_e12, -c_e12i, m_plus_e23, -c_e31i, m_plus_s),
                   mu.k2),
       .k3 =
           mul_add(S(2),
-                  dot(c_minus_e1, m.e2i, -c_minus_e2, m.e1i, -c_minus_e3, m.e123i, c_ei, m_plus_e12,
-                      c_e123, m.e3i, -c_e12i, m_plus_s, -c_e13i, m_plus_e23, -c_e23i, m_plus_e13),
+                  dot(-c_minus_e3, m.e123i, c_minus_e1, m.e2i, -c_minus_e2, m.e1i, c_ei, m_plus_e12,
+                      c_e123, m.e3i, c_e31i, m_plus_e23, -c_e23i, m_plus_e13, -c_e12i, m_plus_s),
                   mu.k3)};
 }
 

@@ -659,27 +659,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Bivector<S> sandwich(const Motor<S>& m,
                                                             const Bivector<S>& b) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
+      const auto three_c_e12 = dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
+                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23),
+              -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e01),
+              turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e01));
+      const auto all_e23 = dot(three_b_e23, -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+                               turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+                               turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto all_e01 =
+          dot(three_b_e01, -three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
+              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), three_c_e01, four(m.s),
+              turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
+      return {.e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e01 = all_e01[0],
+              .e02 = all_e01[1],
+              .e03 = all_e01[2]};
+    }
+  }
   const S twice_e23 = S(2) * m.e23;
   const S twice_e31 = S(2) * m.e31;
   const S twice_e12 = S(2) * m.e12;
+  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31);
+  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12);
+  const S c_e31 = dot(-b.e23, twice_e12, b.e12, twice_e23);
   const S twice_e01 = S(2) * m.e01;
   const S twice_e02 = S(2) * m.e02;
   const S twice_e03 = S(2) * m.e03;
   const S c_e01 = dot(-b.e03, twice_e31, b.e02, twice_e12, -b.e12, twice_e02, b.e31, twice_e03);
-  const S c_e02 = dot(b.e03, twice_e23, -b.e01, twice_e12, b.e12, twice_e01, -b.e23, twice_e03);
-  const S c_e12 = dot(-b.e31, twice_e23, b.e23, twice_e31);
+  const S c_e02 = dot(-b.e01, twice_e12, b.e03, twice_e23, -b.e23, twice_e03, b.e12, twice_e01);
   const S c_e03 = dot(-b.e02, twice_e23, b.e01, twice_e31, -b.e31, twice_e01, b.e23, twice_e02);
-  const S c_e13 = dot(-b.e12, twice_e23, b.e23, twice_e12);
-  const S c_e23 = dot(-b.e12, twice_e31, b.e31, twice_e12);
-  return {.e23 = dot(b.e23, -c_e12, m.e31, -c_e13, m.e12, c_e23, m.s),
-          .e31 = dot(b.e31, c_e12, m.e23, -c_e13, m.s, -c_e23, m.e12),
-          .e12 = dot(b.e12, c_e12, m.s, c_e13, m.e23, c_e23, m.e31),
-          .e01 = dot(b.e01, -c_e12, m.e02, -c_e13, m.e03, -c_e23, m.e0123, c_e01, m.s, c_e02, m.e12,
+  return {.e23 = dot(b.e23, -c_e12, m.e31, c_e31, m.e12, c_e23, m.s),
+          .e31 = dot(b.e31, -c_e23, m.e12, c_e12, m.e23, c_e31, m.s),
+          .e12 = dot(b.e12, -c_e31, m.e23, c_e23, m.e31, c_e12, m.s),
+          .e01 = dot(b.e01, -c_e12, m.e02, c_e31, m.e03, -c_e23, m.e0123, c_e01, m.s, c_e02, m.e12,
                      -c_e03, m.e31),
-          .e02 = dot(b.e02, c_e12, m.e01, c_e13, m.e0123, -c_e23, m.e03, -c_e01, m.e12, c_e02, m.s,
-                     c_e03, m.e23),
-          .e03 = dot(b.e03, -c_e12, m.e0123, c_e13, m.e01, c_e23, m.e02, c_e01, m.e31, -c_e02,
-                     m.e23, c_e03, m.s)};
+          .e02 = dot(b.e02, -c_e23, m.e03, c_e12, m.e01, -c_e31, m.e0123, c_e02, m.s, c_e03, m.e23,
+                     -c_e01, m.e12),
+          .e03 = dot(b.e03, -c_e31, m.e01, c_e23, m.e02, -c_e12, m.e0123, c_e03, m.s, c_e01, m.e31,
+                     -c_e02, m.e23)};
 }
 
 /// sandwich: Motor Plane -> Plane

@@ -6,6 +6,7 @@
 // Kernels: unrolled, sparse, for any scalar type S.
 #pragma once
 
+#include "hamotor/lanes.hpp"
 #include "hamotor/pga3/kernels.hpp"
 #include "hamotor/pga3/se3_elements.hpp"
 #include "hamotor/rate_jacobian.hpp"
@@ -77,27 +78,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Rate<S> Ad(const Motor<S>& m,
                                                        const se3::Rate<S>& w) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_c_e12 = dot(three_twice_e23, turned<2, 3, 4, 2>(three_w_w23),
+                                   -turned<2, 3, 4, 2>(three_twice_e23), three_w_w23);
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_c_e01 =
+          dot(turned<2, 3, 4, 2>(three_twice_e23), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(three_twice_e23), turned<2, 3, 4, 2>(three_w_v1),
+              turned<2, 3, 4, 2>(three_twice_e01), turned<3, 1, 2, 3>(three_w_w23),
+              -turned<3, 1, 2, 3>(three_twice_e01), turned<2, 3, 4, 2>(three_w_w23));
+      const auto all_w23 = dot(three_w_w23, three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+                               -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+                               -turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto all_v1 =
+          dot(three_w_v1, three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), -three_c_e01, four(m.s),
+              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2]};
+    }
+  }
   const S twice_e23 = S(2) * m.e23;
   const S twice_e31 = S(2) * m.e31;
   const S twice_e12 = S(2) * m.e12;
+  const S c_e12 = dot(twice_e23, w.w31, -twice_e31, w.w23);
+  const S c_e23 = dot(twice_e31, w.w12, -twice_e12, w.w31);
+  const S c_e31 = dot(twice_e12, w.w23, -twice_e23, w.w12);
   const S twice_e01 = S(2) * m.e01;
   const S twice_e02 = S(2) * m.e02;
   const S twice_e03 = S(2) * m.e03;
   const S c_e01 = dot(twice_e31, w.v3, -twice_e12, w.v2, twice_e02, w.w12, -twice_e03, w.w31);
-  const S c_e02 = dot(-twice_e23, w.v3, twice_e12, w.v1, -twice_e01, w.w12, twice_e03, w.w23);
-  const S c_e12 = dot(twice_e23, w.w31, -twice_e31, w.w23);
+  const S c_e02 = dot(twice_e12, w.v1, -twice_e23, w.v3, twice_e03, w.w23, -twice_e01, w.w12);
   const S c_e03 = dot(twice_e23, w.v2, -twice_e31, w.v1, twice_e01, w.w31, -twice_e02, w.w23);
-  const S c_e13 = dot(twice_e23, w.w12, -twice_e12, w.w23);
-  const S c_e23 = dot(twice_e31, w.w12, -twice_e12, w.w31);
-  return {.w23 = dot(w.w23, c_e12, m.e31, c_e13, m.e12, -c_e23, m.s),
-          .w31 = dot(w.w31, -c_e12, m.e23, c_e13, m.s, c_e23, m.e12),
-          .w12 = dot(w.w12, -c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31),
-          .v1 = dot(w.v1, c_e12, m.e02, c_e13, m.e03, c_e23, m.e0123, -c_e01, m.s, -c_e02, m.e12,
+  return {.w23 = dot(w.w23, c_e12, m.e31, -c_e31, m.e12, -c_e23, m.s),
+          .w31 = dot(w.w31, c_e23, m.e12, -c_e12, m.e23, -c_e31, m.s),
+          .w12 = dot(w.w12, c_e31, m.e23, -c_e23, m.e31, -c_e12, m.s),
+          .v1 = dot(w.v1, c_e12, m.e02, -c_e31, m.e03, c_e23, m.e0123, -c_e01, m.s, -c_e02, m.e12,
                     c_e03, m.e31),
-          .v2 = dot(w.v2, -c_e12, m.e01, -c_e13, m.e0123, c_e23, m.e03, c_e01, m.e12, -c_e02, m.s,
-                    -c_e03, m.e23),
-          .v3 = dot(w.v3, c_e12, m.e0123, -c_e13, m.e01, -c_e23, m.e02, -c_e01, m.e31, c_e02, m.e23,
-                    -c_e03, m.s)};
+          .v2 = dot(w.v2, c_e23, m.e03, -c_e12, m.e01, c_e31, m.e0123, -c_e02, m.s, -c_e03, m.e23,
+                    c_e01, m.e12),
+          .v3 = dot(w.v3, c_e31, m.e01, -c_e23, m.e02, c_e12, m.e0123, -c_e03, m.s, -c_e01, m.e31,
+                    c_e02, m.e23)};
 }
 
 /// Ad_star_inverse: Motor Momentum -> Momentum
@@ -107,27 +142,61 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr se3::Momentum<S> Ad_star_inverse(
     const Motor<S>& m, const se3::Momentum<S>& mu) noexcept {
-  const S twice_e23 = S(2) * m.e23;
-  const S twice_e31 = S(2) * m.e31;
-  const S twice_e12 = S(2) * m.e12;
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
+      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_c_e01 =
+          dot(turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_twice_e23),
+              -turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_twice_e23),
+              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_twice_e01),
+              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_twice_e01));
+      const auto three_c_e12 = dot(turned<2, 3, 4, 2>(three_mu_p1), three_twice_e23, -three_mu_p1,
+                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto all_l23 =
+          dot(three_mu_l23, three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), -three_c_e01, four(m.s),
+              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
+      const auto all_p1 = dot(three_mu_p1, three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
+                              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
+                              -turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2]};
+    }
+  }
   const S twice_e01 = S(2) * m.e01;
   const S twice_e02 = S(2) * m.e02;
   const S twice_e03 = S(2) * m.e03;
+  const S twice_e23 = S(2) * m.e23;
+  const S twice_e31 = S(2) * m.e31;
+  const S twice_e12 = S(2) * m.e12;
   const S c_e01 = dot(mu.l12, twice_e31, -mu.l31, twice_e12, mu.p3, twice_e02, -mu.p2, twice_e03);
-  const S c_e02 = dot(-mu.l12, twice_e23, mu.l23, twice_e12, -mu.p3, twice_e01, mu.p1, twice_e03);
-  const S c_e12 = dot(mu.p2, twice_e23, -mu.p1, twice_e31);
+  const S c_e02 = dot(mu.l23, twice_e12, -mu.l12, twice_e23, mu.p1, twice_e03, -mu.p3, twice_e01);
   const S c_e03 = dot(mu.l31, twice_e23, -mu.l23, twice_e31, mu.p2, twice_e01, -mu.p1, twice_e02);
-  const S c_e13 = dot(mu.p3, twice_e23, -mu.p1, twice_e12);
+  const S c_e12 = dot(mu.p2, twice_e23, -mu.p1, twice_e31);
   const S c_e23 = dot(mu.p3, twice_e31, -mu.p2, twice_e12);
-  return {.l23 = dot(mu.l23, c_e12, m.e02, c_e13, m.e03, c_e23, m.e0123, -c_e01, m.s, -c_e02, m.e12,
-                     c_e03, m.e31),
-          .l31 = dot(mu.l31, -c_e12, m.e01, -c_e13, m.e0123, c_e23, m.e03, c_e01, m.e12, -c_e02,
-                     m.s, -c_e03, m.e23),
-          .l12 = dot(mu.l12, c_e12, m.e0123, -c_e13, m.e01, -c_e23, m.e02, -c_e01, m.e31, c_e02,
-                     m.e23, -c_e03, m.s),
-          .p1 = dot(mu.p1, c_e12, m.e31, c_e13, m.e12, -c_e23, m.s),
-          .p2 = dot(mu.p2, -c_e12, m.e23, c_e13, m.s, c_e23, m.e12),
-          .p3 = dot(mu.p3, -c_e12, m.s, -c_e13, m.e23, -c_e23, m.e31)};
+  const S c_e31 = dot(mu.p1, twice_e12, -mu.p3, twice_e23);
+  return {.l23 = dot(mu.l23, c_e12, m.e02, -c_e31, m.e03, c_e23, m.e0123, -c_e01, m.s, -c_e02,
+                     m.e12, c_e03, m.e31),
+          .l31 = dot(mu.l31, c_e23, m.e03, -c_e12, m.e01, c_e31, m.e0123, -c_e02, m.s, -c_e03,
+                     m.e23, c_e01, m.e12),
+          .l12 = dot(mu.l12, c_e31, m.e01, -c_e23, m.e02, c_e12, m.e0123, -c_e03, m.s, -c_e01,
+                     m.e31, c_e02, m.e23),
+          .p1 = dot(mu.p1, c_e12, m.e31, -c_e31, m.e12, -c_e23, m.s),
+          .p2 = dot(mu.p2, c_e23, m.e12, -c_e12, m.e23, -c_e31, m.s),
+          .p3 = dot(mu.p3, c_e31, m.e23, -c_e23, m.e31, -c_e12, m.s)};
 }
 
 /// pairing: Momentum Rate -> Scalar

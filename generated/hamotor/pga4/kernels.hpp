@@ -8,6 +8,7 @@
 
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/pga4/elements.hpp"
 
 namespace hamotor::pga4 {
@@ -412,29 +413,70 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Motor<S>& m,
                                                          const Point<S>& x) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
+      const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
+      const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
+      const auto three_x_e2034 = four(x.e2034, x.e0134, x.e1024, x.e2034);
+      const auto three_c_e0124 =
+          dot(-turned<3, 1, 2, 3>(three_m_e12), three_x_e2034, turned<2, 3, 4, 2>(three_m_e12),
+              turned<2, 3, 4, 2>(three_x_e2034), -turned<3, 1, 2, 3>(three_m_e14), four(x.e0123)) +
+          turned<3, 1, 2, 3>(three_m_e01);
+      const S c_e0123 = dot(m.e14, x.e2034, m.e24, x.e0134, m.e34, x.e1024) + m.e04;
+      const S c_e04 = mul_add(m.e1234, x.e0123, -m.e0123);
+      const auto three_m_e0124 = four(m.e0124, m.e0234, -m.e0134, m.e0124);
+      const auto three_c_e01 =
+          mul_add(four(m.e1234), three_x_e2034, turned<2, 3, 4, 2>(three_m_e0124));
+      const auto all_e2034 =
+          mul_add(four(S(2)),
+                  dot(-three_c_e01, four(m.e1234), turned<2, 3, 4, 2>(three_c_e01),
+                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                      turned<2, 3, 4, 2>(three_m_e14), four(c_e04), turned<2, 3, 4, 2>(three_m_e12),
+                      -four(c_e0123), three_m_e14, three_c_e0124, turned<3, 1, 2, 3>(three_m_e12),
+                      -turned<3, 1, 2, 3>(three_c_e0124), three_m_e12,
+                      -turned<2, 3, 4, 2>(three_c_e0124), four(m.s)),
+                  three_x_e2034);
+      const S c_e0234 = three_c_e0124[1];
+      const S c_e0314 = three_c_e0124[2];
+      const S c_e0124 = three_c_e0124[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      return {.e2034 = all_e2034[0],
+              .e0134 = all_e2034[1],
+              .e1024 = all_e2034[2],
+              .e0123 = mul_add(S(2),
+                               dot(-c_e01, m.e23, c_e02, m.e13, -c_e03, m.e12, -c_e04, m.e1234,
+                                   -c_e0123, m.s, c_e0124, m.e34, c_e0314, m.e24, c_e0234, m.e14),
+                               x.e0123)};
+    }
+  }
+  const S c_e0124 = dot(m.e13, x.e2034, m.e23, x.e0134, -m.e34, x.e0123) + m.e03;
+  const S c_e0234 = dot(-m.e12, x.e0134, -m.e13, x.e1024, -m.e14, x.e0123) + m.e01;
+  const S c_e0314 = dot(-m.e23, x.e1024, m.e12, x.e2034, -m.e24, x.e0123) + m.e02;
+  const S c_e0123 = dot(m.e14, x.e2034, m.e24, x.e0134, m.e34, x.e1024) + m.e04;
+  const S c_e04 = mul_add(m.e1234, x.e0123, -m.e0123);
   const S c_e01 = mul_add(m.e1234, x.e2034, m.e0234);
   const S c_e02 = mul_add(m.e1234, x.e0134, -m.e0134);
   const S c_e03 = mul_add(m.e1234, x.e1024, m.e0124);
-  const S c_e0123 = dot(m.e14, x.e2034, m.e24, x.e0134, m.e34, x.e1024) + m.e04;
-  const S c_e04 = mul_add(m.e1234, x.e0123, -m.e0123);
-  const S c_e0124 = dot(m.e13, x.e2034, m.e23, x.e0134, -m.e34, x.e0123) + m.e03;
-  const S c_e0134 = dot(-m.e12, x.e2034, m.e23, x.e1024, m.e24, x.e0123) - m.e02;
-  const S c_e0234 = dot(-m.e12, x.e0134, -m.e13, x.e1024, -m.e14, x.e0123) + m.e01;
   return {.e2034 = mul_add(S(2),
                            dot(-c_e01, m.e1234, c_e02, m.e34, -c_e03, m.e24, c_e04, m.e23, -c_e0123,
-                               m.e14, -c_e0124, m.e13, c_e0134, m.e12, -c_e0234, m.s),
+                               m.e14, -c_e0124, m.e13, -c_e0314, m.e12, -c_e0234, m.s),
                            x.e2034),
           .e0134 = mul_add(S(2),
-                           dot(-c_e01, m.e34, -c_e02, m.e1234, c_e03, m.e14, -c_e04, m.e13,
-                               -c_e0123, m.e24, -c_e0124, m.e23, c_e0134, m.s, c_e0234, m.e12),
+                           dot(-c_e02, m.e1234, c_e03, m.e14, -c_e01, m.e34, -c_e04, m.e13,
+                               -c_e0123, m.e24, c_e0234, m.e12, -c_e0124, m.e23, -c_e0314, m.s),
                            x.e0134),
           .e1024 = mul_add(S(2),
-                           dot(c_e01, m.e24, -c_e02, m.e14, -c_e03, m.e1234, c_e04, m.e12, -c_e0123,
-                               m.e34, -c_e0124, m.s, -c_e0134, m.e23, c_e0234, m.e13),
+                           dot(-c_e03, m.e1234, c_e01, m.e24, -c_e02, m.e14, c_e04, m.e12, -c_e0123,
+                               m.e34, c_e0314, m.e23, c_e0234, m.e13, -c_e0124, m.s),
                            x.e1024),
           .e0123 = mul_add(S(2),
                            dot(-c_e01, m.e23, c_e02, m.e13, -c_e03, m.e12, -c_e04, m.e1234,
-                               -c_e0123, m.s, c_e0124, m.e34, -c_e0134, m.e24, c_e0234, m.e14),
+                               -c_e0123, m.s, c_e0124, m.e34, c_e0314, m.e24, c_e0234, m.e14),
                            x.e0123)};
 }
 
@@ -462,29 +504,66 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Direction<S> sandwich(const Motor<S>& m,
                                                              const Direction<S>& d) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_d_e2034 = four(d.e2034, d.e0134, d.e1024, d.e2034);
+      const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
+      const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
+      const auto three_c_e0124 =
+          dot(-three_d_e2034, turned<3, 1, 2, 3>(three_m_e12), turned<2, 3, 4, 2>(three_d_e2034),
+              turned<2, 3, 4, 2>(three_m_e12), -four(d.e0123), turned<3, 1, 2, 3>(three_m_e14));
+      const S c_e0123 = dot(d.e2034, m.e14, d.e0134, m.e24, d.e1024, m.e34);
+      const S c_e04 = d.e0123 * m.e1234;
+      const auto three_c_e01 = three_d_e2034 * four(m.e1234);
+      const auto all_e2034 =
+          mul_add(four(S(2)),
+                  dot(-three_c_e01, four(m.e1234), turned<2, 3, 4, 2>(three_c_e01),
+                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                      turned<2, 3, 4, 2>(three_m_e14), four(c_e04), turned<2, 3, 4, 2>(three_m_e12),
+                      -four(c_e0123), three_m_e14, three_c_e0124, turned<3, 1, 2, 3>(three_m_e12),
+                      -turned<3, 1, 2, 3>(three_c_e0124), three_m_e12,
+                      -turned<2, 3, 4, 2>(three_c_e0124), four(m.s)),
+                  three_d_e2034);
+      const S c_e0234 = three_c_e0124[1];
+      const S c_e0314 = three_c_e0124[2];
+      const S c_e0124 = three_c_e0124[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      return {.e2034 = all_e2034[0],
+              .e0134 = all_e2034[1],
+              .e1024 = all_e2034[2],
+              .e0123 = mul_add(S(2),
+                               dot(-c_e01, m.e23, c_e02, m.e13, -c_e03, m.e12, -c_e04, m.e1234,
+                                   -c_e0123, m.s, c_e0124, m.e34, c_e0314, m.e24, c_e0234, m.e14),
+                               d.e0123)};
+    }
+  }
+  const S c_e0124 = dot(d.e2034, m.e13, d.e0134, m.e23, -d.e0123, m.e34);
+  const S c_e0234 = dot(-d.e0134, m.e12, -d.e1024, m.e13, -d.e0123, m.e14);
+  const S c_e0314 = dot(-d.e1024, m.e23, d.e2034, m.e12, -d.e0123, m.e24);
+  const S c_e0123 = dot(d.e2034, m.e14, d.e0134, m.e24, d.e1024, m.e34);
+  const S c_e04 = d.e0123 * m.e1234;
   const S c_e01 = d.e2034 * m.e1234;
   const S c_e02 = d.e0134 * m.e1234;
   const S c_e03 = d.e1024 * m.e1234;
-  const S c_e0123 = dot(d.e2034, m.e14, d.e0134, m.e24, d.e1024, m.e34);
-  const S c_e04 = d.e0123 * m.e1234;
-  const S c_e0124 = dot(d.e2034, m.e13, d.e0134, m.e23, -d.e0123, m.e34);
-  const S c_e0134 = dot(-d.e2034, m.e12, d.e1024, m.e23, d.e0123, m.e24);
-  const S c_e0234 = dot(d.e0134, m.e12, d.e1024, m.e13, d.e0123, m.e14);
   return {.e2034 = mul_add(S(2),
                            dot(-c_e01, m.e1234, c_e02, m.e34, -c_e03, m.e24, c_e04, m.e23, -c_e0123,
-                               m.e14, -c_e0124, m.e13, c_e0134, m.e12, c_e0234, m.s),
+                               m.e14, -c_e0124, m.e13, -c_e0314, m.e12, -c_e0234, m.s),
                            d.e2034),
           .e0134 = mul_add(S(2),
-                           dot(-c_e01, m.e34, -c_e02, m.e1234, c_e03, m.e14, -c_e04, m.e13,
-                               -c_e0123, m.e24, -c_e0124, m.e23, c_e0134, m.s, -c_e0234, m.e12),
+                           dot(-c_e02, m.e1234, c_e03, m.e14, -c_e01, m.e34, -c_e04, m.e13,
+                               -c_e0123, m.e24, c_e0234, m.e12, -c_e0124, m.e23, -c_e0314, m.s),
                            d.e0134),
           .e1024 = mul_add(S(2),
-                           dot(c_e01, m.e24, -c_e02, m.e14, -c_e03, m.e1234, c_e04, m.e12, -c_e0123,
-                               m.e34, -c_e0124, m.s, -c_e0134, m.e23, -c_e0234, m.e13),
+                           dot(-c_e03, m.e1234, c_e01, m.e24, -c_e02, m.e14, c_e04, m.e12, -c_e0123,
+                               m.e34, c_e0314, m.e23, c_e0234, m.e13, -c_e0124, m.s),
                            d.e1024),
           .e0123 = mul_add(S(2),
                            dot(-c_e01, m.e23, c_e02, m.e13, -c_e03, m.e12, -c_e04, m.e1234,
-                               -c_e0123, m.s, c_e0124, m.e34, -c_e0134, m.e24, -c_e0234, m.e14),
+                               -c_e0123, m.s, c_e0124, m.e34, c_e0314, m.e24, c_e0234, m.e14),
                            d.e0123)};
 }
 
@@ -495,21 +574,59 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Hyperplane<S> sandwich(const Motor<S>& m,
                                                               const Hyperplane<S>& p) noexcept {
-  const S y_e1 = dot(m.s, p.e1, m.e12, p.e2, m.e13, p.e3, m.e14, p.e4);
-  const S y_e2 = dot(-m.e12, p.e1, m.s, p.e2, m.e23, p.e3, m.e24, p.e4);
-  const S y_e3 = dot(-m.e13, p.e1, -m.e23, p.e2, m.s, p.e3, m.e34, p.e4);
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
+      const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
+      const auto three_p_e1 = four(p.e1, p.e2, p.e3, p.e1);
+      const auto three_y_e124 = dot(-turned<2, 3, 4, 2>(three_m_e14), three_p_e1, three_m_e14,
+                                    turned<2, 3, 4, 2>(three_p_e1), four(m.e1234),
+                                    turned<3, 1, 2, 3>(three_p_e1), -three_m_e12, four(p.e4));
+      const S y_e123 = dot(-m.e23, p.e1, m.e13, p.e2, -m.e12, p.e3, -m.e1234, p.e4);
+      const S y_e4 = dot(-m.e14, p.e1, -m.e24, p.e2, -m.e34, p.e3, m.s, p.e4);
+      const auto three_y_e1 = dot(four(m.s), three_p_e1, three_m_e12,
+                                  turned<2, 3, 4, 2>(three_p_e1), -turned<3, 1, 2, 3>(three_m_e12),
+                                  turned<3, 1, 2, 3>(three_p_e1), three_m_e14, four(p.e4));
+      const S y_e234 = three_y_e124[1];
+      const S y_e314 = three_y_e124[2];
+      const S y_e124 = three_y_e124[0];
+      const S y_e3 = three_y_e1[2];
+      const S y_e2 = three_y_e1[1];
+      const S y_e1 = three_y_e1[0];
+      const auto all_e1 =
+          mul_add(four(S(2)),
+                  dot(three_m_e12, turned<2, 3, 4, 2>(three_y_e1), -turned<3, 1, 2, 3>(three_m_e12),
+                      turned<3, 1, 2, 3>(three_y_e1), three_m_e14, four(y_e4), -four(m.e1234),
+                      turned<2, 3, 4, 2>(three_y_e124)),
+                  three_p_e1);
+      return {.e0 = mul_add(S(2),
+                            dot(m.e01, y_e1, m.e02, y_e2, m.e03, y_e3, m.e04, y_e4, -m.e0123,
+                                y_e123, -m.e0124, y_e124, m.e0134, y_e314, -m.e0234, y_e234),
+                            p.e0),
+              .e1 = all_e1[0],
+              .e2 = all_e1[1],
+              .e3 = all_e1[2],
+              .e4 = mul_add(S(2), dot(-m.e14, y_e1, -m.e24, y_e2, -m.e34, y_e3, m.e1234, y_e123),
+                            p.e4)};
+    }
+  }
+  const S y_e124 = dot(-m.e24, p.e1, m.e14, p.e2, m.e1234, p.e3, -m.e12, p.e4);
+  const S y_e234 = dot(-m.e34, p.e2, m.e24, p.e3, m.e1234, p.e1, -m.e23, p.e4);
+  const S y_e314 = dot(-m.e14, p.e3, m.e34, p.e1, m.e1234, p.e2, m.e13, p.e4);
   const S y_e123 = dot(-m.e23, p.e1, m.e13, p.e2, -m.e12, p.e3, -m.e1234, p.e4);
   const S y_e4 = dot(-m.e14, p.e1, -m.e24, p.e2, -m.e34, p.e3, m.s, p.e4);
-  const S y_e124 = dot(-m.e24, p.e1, m.e14, p.e2, m.e1234, p.e3, -m.e12, p.e4);
-  const S y_e134 = dot(-m.e34, p.e1, -m.e1234, p.e2, m.e14, p.e3, -m.e13, p.e4);
-  const S y_e234 = dot(m.e1234, p.e1, -m.e34, p.e2, m.e24, p.e3, -m.e23, p.e4);
+  const S y_e1 = dot(m.s, p.e1, m.e12, p.e2, m.e13, p.e3, m.e14, p.e4);
+  const S y_e2 = dot(m.s, p.e2, m.e23, p.e3, -m.e12, p.e1, m.e24, p.e4);
+  const S y_e3 = dot(m.s, p.e3, -m.e13, p.e1, -m.e23, p.e2, m.e34, p.e4);
   return {
       .e0 = mul_add(S(2),
                     dot(m.e01, y_e1, m.e02, y_e2, m.e03, y_e3, m.e04, y_e4, -m.e0123, y_e123,
-                        -m.e0124, y_e124, -m.e0134, y_e134, -m.e0234, y_e234),
+                        -m.e0124, y_e124, m.e0134, y_e314, -m.e0234, y_e234),
                     p.e0),
       .e1 = mul_add(S(2), dot(m.e12, y_e2, m.e13, y_e3, m.e14, y_e4, -m.e1234, y_e234), p.e1),
-      .e2 = mul_add(S(2), dot(-m.e12, y_e1, m.e23, y_e3, m.e24, y_e4, m.e1234, y_e134), p.e2),
+      .e2 = mul_add(S(2), dot(m.e23, y_e3, -m.e12, y_e1, m.e24, y_e4, -m.e1234, y_e314), p.e2),
       .e3 = mul_add(S(2), dot(-m.e13, y_e1, -m.e23, y_e2, m.e34, y_e4, -m.e1234, y_e124), p.e3),
       .e4 = mul_add(S(2), dot(-m.e14, y_e1, -m.e24, y_e2, -m.e34, y_e3, m.e1234, y_e123), p.e4)};
 }
@@ -674,29 +791,66 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Point<S> sandwich(const Rotor<S>& r,
                                                          const Point<S>& x) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_r_e12 = four(r.e12, r.e23, -r.e13, r.e12);
+      const auto three_r_e14 = four(r.e14, r.e24, r.e34, r.e14);
+      const auto three_x_e2034 = four(x.e2034, x.e0134, x.e1024, x.e2034);
+      const auto three_c_e0124 =
+          dot(-turned<3, 1, 2, 3>(three_r_e12), three_x_e2034, turned<2, 3, 4, 2>(three_r_e12),
+              turned<2, 3, 4, 2>(three_x_e2034), -turned<3, 1, 2, 3>(three_r_e14), four(x.e0123));
+      const S c_e0123 = dot(r.e14, x.e2034, r.e24, x.e0134, r.e34, x.e1024);
+      const S c_e04 = r.e1234 * x.e0123;
+      const auto three_c_e01 = four(r.e1234) * three_x_e2034;
+      const auto all_e2034 =
+          mul_add(four(S(2)),
+                  dot(-three_c_e01, four(r.e1234), turned<2, 3, 4, 2>(three_c_e01),
+                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                      turned<2, 3, 4, 2>(three_r_e14), four(c_e04), turned<2, 3, 4, 2>(three_r_e12),
+                      -four(c_e0123), three_r_e14, three_c_e0124, turned<3, 1, 2, 3>(three_r_e12),
+                      -turned<3, 1, 2, 3>(three_c_e0124), three_r_e12,
+                      -turned<2, 3, 4, 2>(three_c_e0124), four(r.s)),
+                  three_x_e2034);
+      const S c_e0234 = three_c_e0124[1];
+      const S c_e0314 = three_c_e0124[2];
+      const S c_e0124 = three_c_e0124[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      return {.e2034 = all_e2034[0],
+              .e0134 = all_e2034[1],
+              .e1024 = all_e2034[2],
+              .e0123 = mul_add(S(2),
+                               dot(-c_e01, r.e23, c_e02, r.e13, -c_e03, r.e12, -c_e04, r.e1234,
+                                   -c_e0123, r.s, c_e0124, r.e34, c_e0314, r.e24, c_e0234, r.e14),
+                               x.e0123)};
+    }
+  }
+  const S c_e0124 = dot(r.e13, x.e2034, r.e23, x.e0134, -r.e34, x.e0123);
+  const S c_e0234 = dot(-r.e12, x.e0134, -r.e13, x.e1024, -r.e14, x.e0123);
+  const S c_e0314 = dot(-r.e23, x.e1024, r.e12, x.e2034, -r.e24, x.e0123);
+  const S c_e0123 = dot(r.e14, x.e2034, r.e24, x.e0134, r.e34, x.e1024);
+  const S c_e04 = r.e1234 * x.e0123;
   const S c_e01 = r.e1234 * x.e2034;
   const S c_e02 = r.e1234 * x.e0134;
   const S c_e03 = r.e1234 * x.e1024;
-  const S c_e0123 = dot(r.e14, x.e2034, r.e24, x.e0134, r.e34, x.e1024);
-  const S c_e04 = r.e1234 * x.e0123;
-  const S c_e0124 = dot(r.e13, x.e2034, r.e23, x.e0134, -r.e34, x.e0123);
-  const S c_e0134 = dot(-r.e12, x.e2034, r.e23, x.e1024, r.e24, x.e0123);
-  const S c_e0234 = dot(r.e12, x.e0134, r.e13, x.e1024, r.e14, x.e0123);
   return {.e2034 = mul_add(S(2),
                            dot(-c_e01, r.e1234, c_e02, r.e34, -c_e03, r.e24, c_e04, r.e23, -c_e0123,
-                               r.e14, -c_e0124, r.e13, c_e0134, r.e12, c_e0234, r.s),
+                               r.e14, -c_e0124, r.e13, -c_e0314, r.e12, -c_e0234, r.s),
                            x.e2034),
           .e0134 = mul_add(S(2),
-                           dot(-c_e01, r.e34, -c_e02, r.e1234, c_e03, r.e14, -c_e04, r.e13,
-                               -c_e0123, r.e24, -c_e0124, r.e23, c_e0134, r.s, -c_e0234, r.e12),
+                           dot(-c_e02, r.e1234, c_e03, r.e14, -c_e01, r.e34, -c_e04, r.e13,
+                               -c_e0123, r.e24, c_e0234, r.e12, -c_e0124, r.e23, -c_e0314, r.s),
                            x.e0134),
           .e1024 = mul_add(S(2),
-                           dot(c_e01, r.e24, -c_e02, r.e14, -c_e03, r.e1234, c_e04, r.e12, -c_e0123,
-                               r.e34, -c_e0124, r.s, -c_e0134, r.e23, -c_e0234, r.e13),
+                           dot(-c_e03, r.e1234, c_e01, r.e24, -c_e02, r.e14, c_e04, r.e12, -c_e0123,
+                               r.e34, c_e0314, r.e23, c_e0234, r.e13, -c_e0124, r.s),
                            x.e1024),
           .e0123 = mul_add(S(2),
                            dot(-c_e01, r.e23, c_e02, r.e13, -c_e03, r.e12, -c_e04, r.e1234,
-                               -c_e0123, r.s, c_e0124, r.e34, -c_e0134, r.e24, -c_e0234, r.e14),
+                               -c_e0123, r.s, c_e0124, r.e34, c_e0314, r.e24, c_e0234, r.e14),
                            x.e0123)};
 }
 
@@ -707,29 +861,66 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Direction<S> sandwich(const Rotor<S>& r,
                                                              const Direction<S>& d) noexcept {
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_d_e2034 = four(d.e2034, d.e0134, d.e1024, d.e2034);
+      const auto three_r_e12 = four(r.e12, r.e23, -r.e13, r.e12);
+      const auto three_r_e14 = four(r.e14, r.e24, r.e34, r.e14);
+      const auto three_c_e0124 =
+          dot(-three_d_e2034, turned<3, 1, 2, 3>(three_r_e12), turned<2, 3, 4, 2>(three_d_e2034),
+              turned<2, 3, 4, 2>(three_r_e12), -four(d.e0123), turned<3, 1, 2, 3>(three_r_e14));
+      const S c_e0123 = dot(d.e2034, r.e14, d.e0134, r.e24, d.e1024, r.e34);
+      const S c_e04 = d.e0123 * r.e1234;
+      const auto three_c_e01 = three_d_e2034 * four(r.e1234);
+      const auto all_e2034 =
+          mul_add(four(S(2)),
+                  dot(-three_c_e01, four(r.e1234), turned<2, 3, 4, 2>(three_c_e01),
+                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                      turned<2, 3, 4, 2>(three_r_e14), four(c_e04), turned<2, 3, 4, 2>(three_r_e12),
+                      -four(c_e0123), three_r_e14, three_c_e0124, turned<3, 1, 2, 3>(three_r_e12),
+                      -turned<3, 1, 2, 3>(three_c_e0124), three_r_e12,
+                      -turned<2, 3, 4, 2>(three_c_e0124), four(r.s)),
+                  three_d_e2034);
+      const S c_e0234 = three_c_e0124[1];
+      const S c_e0314 = three_c_e0124[2];
+      const S c_e0124 = three_c_e0124[0];
+      const S c_e03 = three_c_e01[2];
+      const S c_e02 = three_c_e01[1];
+      const S c_e01 = three_c_e01[0];
+      return {.e2034 = all_e2034[0],
+              .e0134 = all_e2034[1],
+              .e1024 = all_e2034[2],
+              .e0123 = mul_add(S(2),
+                               dot(-c_e01, r.e23, c_e02, r.e13, -c_e03, r.e12, -c_e04, r.e1234,
+                                   -c_e0123, r.s, c_e0124, r.e34, c_e0314, r.e24, c_e0234, r.e14),
+                               d.e0123)};
+    }
+  }
+  const S c_e0124 = dot(d.e2034, r.e13, d.e0134, r.e23, -d.e0123, r.e34);
+  const S c_e0234 = dot(-d.e0134, r.e12, -d.e1024, r.e13, -d.e0123, r.e14);
+  const S c_e0314 = dot(-d.e1024, r.e23, d.e2034, r.e12, -d.e0123, r.e24);
+  const S c_e0123 = dot(d.e2034, r.e14, d.e0134, r.e24, d.e1024, r.e34);
+  const S c_e04 = d.e0123 * r.e1234;
   const S c_e01 = d.e2034 * r.e1234;
   const S c_e02 = d.e0134 * r.e1234;
   const S c_e03 = d.e1024 * r.e1234;
-  const S c_e0123 = dot(d.e2034, r.e14, d.e0134, r.e24, d.e1024, r.e34);
-  const S c_e04 = d.e0123 * r.e1234;
-  const S c_e0124 = dot(d.e2034, r.e13, d.e0134, r.e23, -d.e0123, r.e34);
-  const S c_e0134 = dot(-d.e2034, r.e12, d.e1024, r.e23, d.e0123, r.e24);
-  const S c_e0234 = dot(d.e0134, r.e12, d.e1024, r.e13, d.e0123, r.e14);
   return {.e2034 = mul_add(S(2),
                            dot(-c_e01, r.e1234, c_e02, r.e34, -c_e03, r.e24, c_e04, r.e23, -c_e0123,
-                               r.e14, -c_e0124, r.e13, c_e0134, r.e12, c_e0234, r.s),
+                               r.e14, -c_e0124, r.e13, -c_e0314, r.e12, -c_e0234, r.s),
                            d.e2034),
           .e0134 = mul_add(S(2),
-                           dot(-c_e01, r.e34, -c_e02, r.e1234, c_e03, r.e14, -c_e04, r.e13,
-                               -c_e0123, r.e24, -c_e0124, r.e23, c_e0134, r.s, -c_e0234, r.e12),
+                           dot(-c_e02, r.e1234, c_e03, r.e14, -c_e01, r.e34, -c_e04, r.e13,
+                               -c_e0123, r.e24, c_e0234, r.e12, -c_e0124, r.e23, -c_e0314, r.s),
                            d.e0134),
           .e1024 = mul_add(S(2),
-                           dot(c_e01, r.e24, -c_e02, r.e14, -c_e03, r.e1234, c_e04, r.e12, -c_e0123,
-                               r.e34, -c_e0124, r.s, -c_e0134, r.e23, -c_e0234, r.e13),
+                           dot(-c_e03, r.e1234, c_e01, r.e24, -c_e02, r.e14, c_e04, r.e12, -c_e0123,
+                               r.e34, c_e0314, r.e23, c_e0234, r.e13, -c_e0124, r.s),
                            d.e1024),
           .e0123 = mul_add(S(2),
                            dot(-c_e01, r.e23, c_e02, r.e13, -c_e03, r.e12, -c_e04, r.e1234,
-                               -c_e0123, r.s, c_e0124, r.e34, -c_e0134, r.e24, -c_e0234, r.e14),
+                               -c_e0123, r.s, c_e0124, r.e34, c_e0314, r.e24, c_e0234, r.e14),
                            d.e0123)};
 }
 

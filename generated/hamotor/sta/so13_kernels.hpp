@@ -8,6 +8,7 @@
 
 #include "hamotor/bivector_exponential.hpp"
 #include "hamotor/bivector_logarithm.hpp"
+#include "hamotor/lanes.hpp"
 #include "hamotor/rate_jacobian.hpp"
 #include "hamotor/sta/kernels.hpp"
 #include "hamotor/sta/so13_elements.hpp"
@@ -48,32 +49,62 @@ template <class S>
 
 /// kinematics: Rotor Rate -> Rotor
 /// m w: the velocity of m with body rate w (not a unit versor).
-/// Cost: 54 mul, 40 add (32 fused).  Sparsity: 48 of 48 pairs of components.
+/// Cost: 54 mul, 40 add (30 fused).  Sparsity: 48 of 48 pairs of components.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr Rotor<S> kinematics(const Rotor<S>& r,
                                                            const so13::Rate<S>& w) noexcept {
-  const S half_w23 = S(0.5) * w.w23;
-  const S half_w31 = S(0.5) * w.w31;
-  const S half_w12 = S(0.5) * w.w12;
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_half_v1 = four(S(0.5)) * three_w_v1;
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_half_w23 = four(S(0.5)) * three_w_w23;
+      const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
+      const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
+      const auto all_e23 = dot(-three_half_w23, four(r.s), -turned<3, 1, 2, 3>(three_half_w23),
+                               turned<2, 3, 4, 2>(three_r_e23), turned<2, 3, 4, 2>(three_half_w23),
+                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(three_half_v1),
+                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(three_half_v1),
+                               turned<3, 1, 2, 3>(three_r_e10), -three_half_v1, four(r.e0123));
+      const auto all_e10 = dot(three_half_v1, four(r.s), turned<3, 1, 2, 3>(three_half_v1),
+                               turned<2, 3, 4, 2>(three_r_e23), -turned<2, 3, 4, 2>(three_half_v1),
+                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(three_half_w23),
+                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(three_half_w23),
+                               turned<3, 1, 2, 3>(three_r_e10), -three_half_w23, four(r.e0123));
+      return {.s = lanes::total(dot(three_half_w23, three_r_e23, three_half_v1, three_r_e10)),
+              .e23 = all_e23[0],
+              .e31 = all_e23[1],
+              .e12 = all_e23[2],
+              .e10 = all_e10[0],
+              .e20 = all_e10[1],
+              .e30 = all_e10[2],
+              .e0123 = lanes::total(dot(-three_half_v1, three_r_e23, three_half_w23, three_r_e10))};
+    }
+  }
   const S half_v1 = S(0.5) * w.v1;
   const S half_v2 = S(0.5) * w.v2;
   const S half_v3 = S(0.5) * w.v3;
-  return {.s = dot(half_w23, r.e23, half_w31, r.e31, half_w12, r.e12, half_v1, r.e10, half_v2,
-                   r.e20, half_v3, r.e30),
+  const S half_w23 = S(0.5) * w.w23;
+  const S half_w31 = S(0.5) * w.w31;
+  const S half_w12 = S(0.5) * w.w12;
+  return {.s = dot(half_w23, r.e23, half_v1, r.e10) + dot(half_w31, r.e31, half_v2, r.e20) +
+               dot(half_w12, r.e12, half_v3, r.e30),
           .e23 = dot(-half_w23, r.s, -half_w12, r.e31, half_w31, r.e12, -half_v3, r.e20, half_v2,
                      r.e30, -half_v1, r.e0123),
-          .e31 = dot(-half_w31, r.s, half_w12, r.e23, -half_w23, r.e12, half_v3, r.e10, -half_v1,
-                     r.e30, -half_v2, r.e0123),
+          .e31 = dot(-half_w31, r.s, -half_w23, r.e12, half_w12, r.e23, -half_v1, r.e30, half_v3,
+                     r.e10, -half_v2, r.e0123),
           .e12 = dot(-half_w12, r.s, -half_w31, r.e23, half_w23, r.e31, -half_v2, r.e10, half_v1,
                      r.e20, -half_v3, r.e0123),
           .e10 = dot(half_v1, r.s, half_v3, r.e31, -half_v2, r.e12, -half_w12, r.e20, half_w31,
                      r.e30, -half_w23, r.e0123),
-          .e20 = dot(half_v2, r.s, -half_v3, r.e23, half_v1, r.e12, half_w12, r.e10, -half_w23,
-                     r.e30, -half_w31, r.e0123),
+          .e20 = dot(half_v2, r.s, half_v1, r.e12, -half_v3, r.e23, -half_w23, r.e30, half_w12,
+                     r.e10, -half_w31, r.e0123),
           .e30 = dot(half_v3, r.s, half_v2, r.e23, -half_v1, r.e31, -half_w31, r.e10, half_w23,
                      r.e20, -half_w12, r.e0123),
-          .e0123 = dot(-half_v1, r.e23, -half_v2, r.e31, -half_v3, r.e12, half_w23, r.e10, half_w31,
-                       r.e20, half_w12, r.e30)};
+          .e0123 = dot(-half_v1, r.e23, half_w23, r.e10) + dot(-half_v2, r.e31, half_w31, r.e20) +
+                   dot(-half_v3, r.e12, half_w12, r.e30)};
 }
 
 /// Ad: Rotor Rate -> Rate
@@ -83,30 +114,69 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so13::Rate<S> Ad(const Rotor<S>& r,
                                                         const so13::Rate<S>& w) noexcept {
-  const S twice_e23 = S(2) * r.e23;
-  const S twice_e31 = S(2) * r.e31;
-  const S twice_e12 = S(2) * r.e12;
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
+      const auto three_twice_e10 = four(S(2)) * three_r_e10;
+      const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
+      const auto three_twice_e23 = four(S(2)) * three_r_e23;
+      const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
+      const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
+      const auto three_c_e12 =
+          dot(-three_twice_e23, turned<2, 3, 4, 2>(three_w_w23),
+              turned<2, 3, 4, 2>(three_twice_e23), three_w_w23, -three_twice_e10,
+              turned<2, 3, 4, 2>(three_w_v1), turned<2, 3, 4, 2>(three_twice_e10), three_w_v1);
+      const auto three_c_e01 =
+          dot(-turned<2, 3, 4, 2>(three_twice_e23), turned<3, 1, 2, 3>(three_w_v1),
+              turned<3, 1, 2, 3>(three_twice_e23), turned<2, 3, 4, 2>(three_w_v1),
+              turned<2, 3, 4, 2>(three_twice_e10), turned<3, 1, 2, 3>(three_w_w23),
+              -turned<3, 1, 2, 3>(three_twice_e10), turned<2, 3, 4, 2>(three_w_w23));
+      const auto all_w23 =
+          dot(three_w_w23, -three_c_e01, four(r.e0123), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_r_e10), -three_c_e12, turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e10),
+              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e23),
+              -turned<2, 3, 4, 2>(three_c_e12), four(r.s));
+      const auto all_v1 =
+          dot(three_w_v1, -three_c_e01, four(r.s), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_r_e23), three_c_e12, turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e10),
+              turned<2, 3, 4, 2>(three_c_e12), four(r.e0123));
+      return {.w23 = all_w23[0],
+              .w31 = all_w23[1],
+              .w12 = all_w23[2],
+              .v1 = all_v1[0],
+              .v2 = all_v1[1],
+              .v3 = all_v1[2]};
+    }
+  }
   const S twice_e10 = S(2) * r.e10;
   const S twice_e20 = S(2) * r.e20;
   const S twice_e30 = S(2) * r.e30;
-  const S c_e01 = dot(-twice_e31, w.v3, twice_e12, w.v2, twice_e20, w.w12, -twice_e30, w.w31);
-  const S c_e02 = dot(twice_e23, w.v3, -twice_e12, w.v1, -twice_e10, w.w12, twice_e30, w.w23);
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
   const S c_e12 = dot(-twice_e23, w.w31, twice_e31, w.w23, -twice_e10, w.v2, twice_e20, w.v1);
-  const S c_e03 = dot(-twice_e23, w.v2, twice_e31, w.v1, twice_e10, w.w31, -twice_e20, w.w23);
-  const S c_e13 = dot(-twice_e23, w.w12, twice_e12, w.w23, -twice_e10, w.v3, twice_e30, w.v1);
   const S c_e23 = dot(-twice_e31, w.w12, twice_e12, w.w31, -twice_e20, w.v3, twice_e30, w.v2);
-  return {.w23 = dot(w.w23, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
+  const S c_e31 = dot(-twice_e12, w.w23, twice_e23, w.w12, -twice_e30, w.v1, twice_e10, w.v3);
+  const S c_e01 = dot(-twice_e31, w.v3, twice_e12, w.v2, twice_e20, w.w12, -twice_e30, w.w31);
+  const S c_e02 = dot(-twice_e12, w.v1, twice_e23, w.v3, twice_e30, w.w23, -twice_e10, w.w12);
+  const S c_e03 = dot(-twice_e23, w.v2, twice_e31, w.v1, twice_e10, w.w31, -twice_e20, w.w23);
+  return {.w23 = dot(w.w23, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, c_e31,
                      r.e12, -c_e23, r.s),
-          .w31 = dot(w.w31, -c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
-                     -c_e23, r.e12),
-          .w12 = dot(w.w12, c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13, r.e23,
-                     c_e23, r.e31),
-          .v1 = dot(w.v1, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
+          .w31 = dot(w.w31, -c_e02, r.e0123, c_e03, r.e10, -c_e23, r.e12, -c_e01, r.e30, c_e12,
+                     r.e23, -c_e31, r.s),
+          .w12 = dot(w.w12, -c_e03, r.e0123, c_e01, r.e20, -c_e31, r.e23, -c_e02, r.e10, c_e23,
+                     r.e31, -c_e12, r.s),
+          .v1 = dot(w.v1, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, -c_e31, r.e30,
                     c_e23, r.e0123),
-          .v2 = dot(w.v2, -c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13, r.e0123,
-                    c_e23, r.e30),
-          .v3 = dot(w.v3, c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13, r.e10,
-                    -c_e23, r.e20)};
+          .v2 = dot(w.v2, -c_e02, r.s, c_e03, r.e23, c_e23, r.e30, -c_e01, r.e12, -c_e12, r.e10,
+                    c_e31, r.e0123),
+          .v3 = dot(w.v3, -c_e03, r.s, c_e01, r.e31, c_e31, r.e10, -c_e02, r.e23, -c_e23, r.e20,
+                    c_e12, r.e0123)};
 }
 
 /// Ad_star_inverse: Rotor Momentum -> Momentum
@@ -116,30 +186,69 @@ template <class S>
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr so13::Momentum<S> Ad_star_inverse(
     const Rotor<S>& r, const so13::Momentum<S>& mu) noexcept {
-  const S twice_e23 = S(2) * r.e23;
-  const S twice_e31 = S(2) * r.e31;
-  const S twice_e12 = S(2) * r.e12;
+  if constexpr (lanes::packed<S> && !lanes::loops_become_lanes) {
+    if (!std::is_constant_evaluated()) {
+      using lanes::four;
+      using lanes::turned;
+      const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
+      const auto three_twice_e10 = four(S(2)) * three_r_e10;
+      const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
+      const auto three_twice_e23 = four(S(2)) * three_r_e23;
+      const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
+      const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
+      const auto three_c_e12 =
+          dot(-turned<2, 3, 4, 2>(three_mu_p1), three_twice_e23, three_mu_p1,
+              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_mu_l23),
+              three_twice_e10, three_mu_l23, turned<2, 3, 4, 2>(three_twice_e10));
+      const auto three_c_e01 =
+          dot(-turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_twice_e23),
+              turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_twice_e23),
+              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_twice_e10),
+              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_twice_e10));
+      const auto all_l23 =
+          dot(three_mu_l23, -three_c_e01, four(r.s), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_r_e23), three_c_e12, turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e10),
+              turned<2, 3, 4, 2>(three_c_e12), four(r.e0123));
+      const auto all_p1 =
+          dot(three_mu_p1, -three_c_e01, four(r.e0123), turned<2, 3, 4, 2>(three_c_e01),
+              turned<3, 1, 2, 3>(three_r_e10), -three_c_e12, turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e10),
+              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e23),
+              -turned<2, 3, 4, 2>(three_c_e12), four(r.s));
+      return {.l23 = all_l23[0],
+              .l31 = all_l23[1],
+              .l12 = all_l23[2],
+              .p1 = all_p1[0],
+              .p2 = all_p1[1],
+              .p3 = all_p1[2]};
+    }
+  }
   const S twice_e10 = S(2) * r.e10;
   const S twice_e20 = S(2) * r.e20;
   const S twice_e30 = S(2) * r.e30;
-  const S c_e01 = dot(-mu.l12, twice_e31, mu.l31, twice_e12, mu.p3, twice_e20, -mu.p2, twice_e30);
-  const S c_e02 = dot(mu.l12, twice_e23, -mu.l23, twice_e12, -mu.p3, twice_e10, mu.p1, twice_e30);
+  const S twice_e23 = S(2) * r.e23;
+  const S twice_e31 = S(2) * r.e31;
+  const S twice_e12 = S(2) * r.e12;
   const S c_e12 = dot(-mu.p2, twice_e23, mu.p1, twice_e31, -mu.l31, twice_e10, mu.l23, twice_e20);
-  const S c_e03 = dot(-mu.l31, twice_e23, mu.l23, twice_e31, mu.p2, twice_e10, -mu.p1, twice_e20);
-  const S c_e13 = dot(-mu.p3, twice_e23, mu.p1, twice_e12, -mu.l12, twice_e10, mu.l23, twice_e30);
   const S c_e23 = dot(-mu.p3, twice_e31, mu.p2, twice_e12, -mu.l12, twice_e20, mu.l31, twice_e30);
-  return {.l23 = dot(mu.l23, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, c_e13, r.e30,
+  const S c_e31 = dot(-mu.p1, twice_e12, mu.p3, twice_e23, -mu.l23, twice_e30, mu.l12, twice_e10);
+  const S c_e01 = dot(-mu.l12, twice_e31, mu.l31, twice_e12, mu.p3, twice_e20, -mu.p2, twice_e30);
+  const S c_e02 = dot(-mu.l23, twice_e12, mu.l12, twice_e23, mu.p1, twice_e30, -mu.p3, twice_e10);
+  const S c_e03 = dot(-mu.l31, twice_e23, mu.l23, twice_e31, mu.p2, twice_e10, -mu.p1, twice_e20);
+  return {.l23 = dot(mu.l23, -c_e01, r.s, c_e02, r.e12, c_e12, r.e20, -c_e03, r.e31, -c_e31, r.e30,
                      c_e23, r.e0123),
-          .l31 = dot(mu.l31, -c_e01, r.e12, -c_e02, r.s, -c_e12, r.e10, c_e03, r.e23, -c_e13,
-                     r.e0123, c_e23, r.e30),
-          .l12 = dot(mu.l12, c_e01, r.e31, -c_e02, r.e23, c_e12, r.e0123, -c_e03, r.s, -c_e13,
-                     r.e10, -c_e23, r.e20),
-          .p1 = dot(mu.p1, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, -c_e13,
+          .l31 = dot(mu.l31, -c_e02, r.s, c_e03, r.e23, c_e23, r.e30, -c_e01, r.e12, -c_e12, r.e10,
+                     c_e31, r.e0123),
+          .l12 = dot(mu.l12, -c_e03, r.s, c_e01, r.e31, c_e31, r.e10, -c_e02, r.e23, -c_e23, r.e20,
+                     c_e12, r.e0123),
+          .p1 = dot(mu.p1, -c_e01, r.e0123, c_e02, r.e30, -c_e12, r.e31, -c_e03, r.e20, c_e31,
                     r.e12, -c_e23, r.s),
-          .p2 = dot(mu.p2, -c_e01, r.e30, -c_e02, r.e0123, c_e12, r.e23, c_e03, r.e10, c_e13, r.s,
-                    -c_e23, r.e12),
-          .p3 = dot(mu.p3, c_e01, r.e20, -c_e02, r.e10, -c_e12, r.s, -c_e03, r.e0123, c_e13, r.e23,
-                    c_e23, r.e31)};
+          .p2 = dot(mu.p2, -c_e02, r.e0123, c_e03, r.e10, -c_e23, r.e12, -c_e01, r.e30, c_e12,
+                    r.e23, -c_e31, r.s),
+          .p3 = dot(mu.p3, -c_e03, r.e0123, c_e01, r.e20, -c_e31, r.e23, -c_e02, r.e10, c_e23,
+                    r.e31, -c_e12, r.s)};
 }
 
 /// pairing: Momentum Rate -> Scalar

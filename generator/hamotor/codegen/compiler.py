@@ -29,14 +29,8 @@ if TYPE_CHECKING:
 
 TEMPLATES = Path(__file__).resolve().parents[3] / "templates"
 WIDTH = 100
-INLINED_OPERATIONS = 128
-"""Kernels of at most so many additions, multiplications and divisions are always inlined: for
-them the way of a result through memory costs more than the arithmetic."""
 INLINED_WITH_CALLS = 320
 """exp, log, normalize and their like may come to so many with the functions that they call."""
-PACKED_OPERATIONS = 48
-"""Kernels of at least so many operations are written four lanes at a time where they can be."""
-PACKED = "if constexpr (lanes::packed<S>) {"
 RUNTIME_HEADERS = {
     "bivector_exponential": "hamotor/bivector_exponential.hpp",
     **dict.fromkeys(
@@ -205,7 +199,7 @@ def kernel_data(kernel: Kernel) -> dict[str, Any]:
     cost = kernel.program.cost
     short = shortcut_cost(kernel)
     whole = cost.total + _operations_of_calls(kernel.program)
-    inlined = cost.total <= INLINED_OPERATIONS and (
+    inlined = cost.total <= lanes.INLINED_OPERATIONS and (
         not cost.calls.keys() - {"compensated_sum"}
         or (kernel.meaning is None and whole <= INLINED_WITH_CALLS)
     )
@@ -231,7 +225,7 @@ def shortcut_cost(kernel: Kernel) -> Cost | None:
 def _body(kernel: Kernel) -> list[str]:
     if kernel.shortcut is not None:
         return cpp.shortcut_lines(kernel.shortcut, kernel.program)
-    return [*_packed_body(kernel), *cpp.body_lines(kernel.program)]
+    return [*lanes.packed_body(kernel), *cpp.body_lines(kernel.program)]
 
 
 def _operations_of_calls(program: Program) -> int:
@@ -249,25 +243,6 @@ def _operations_of_calls(program: Program) -> int:
     return sum(operations(node) for node in program.nodes() if isinstance(node, Call))
 
 
-def _packed_body(kernel: Kernel) -> list[str]:
-    """What a kernel of many operations does first, where the scalar and the processor allow it."""
-    cost = kernel.program.cost
-    if cost.calls or cost.total < PACKED_OPERATIONS:
-        return []
-    packed = lanes.packed_lines(kernel.program, whole=cost.total <= INLINED_OPERATIONS)
-    if packed is None:
-        return []
-    return [
-        PACKED,
-        "if (!std::is_constant_evaluated()) {",
-        "using lanes::four;",
-        "using lanes::turned;",
-        *packed,
-        "}",
-        "}",
-    ]
-
-
 def _kernels_file(
     spec: AlgebraSpec,
     folder: str,
@@ -280,7 +255,7 @@ def _kernels_file(
     needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
     found = {RUNTIME_HEADERS[f]: None for f in sorted(needed) if f in RUNTIME_HEADERS}
     data = [kernel_data(k) for k in kernels]
-    packed = ["hamotor/lanes.hpp"] if any(PACKED in k["body"] for k in data) else []
+    packed = ["hamotor/lanes.hpp"] if any(lanes.packed_body(k) for k in kernels) else []
     includes = [*includes, *found, *packed]
     text = render(
         template,

@@ -22,6 +22,7 @@ from hamotor.codegen.algebra import (
     ratio,
     reverse_sign,
 )
+from hamotor.codegen.cyclic import Turn
 from hamotor.codegen.element import Element
 from hamotor.codegen.nullsplit import SplitProduct, hyperbolic_pairs, split_products, split_program
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector
@@ -50,6 +51,7 @@ class Kernel:
     name:     C++ function name; law: what it computes, in formulas, for its documentation.
     program:  for every input; shortcut: for most, where there is a shorter one.
     meaning:  component → polynomial in `parameter.component`; None for transcendental kernels.
+    turn:     what leaves the program as it is, where it is written in vectors of three.
     pairs:    (kept, possible) products of components, the sparsity of a bilinear kernel.
     """
 
@@ -61,6 +63,7 @@ class Kernel:
     pairs: tuple[int, int] | None = None
     notes: tuple[str, ...] = ()
     shortcut: Shortcut | None = None
+    turn: Turn | None = None
 
     @property
     def operands(self) -> tuple[Element, ...]:

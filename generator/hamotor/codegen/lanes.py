@@ -10,9 +10,13 @@ product they neither vectorise one object nor a loop over many.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from itertools import permutations
 
 from hamotor.codegen import cpp
+from hamotor.codegen.algebra import Algebra
+from hamotor.codegen.cyclic import Three, Turn, cyclic_program, substituted
+from hamotor.codegen.kernel import Kernel, proved
 from hamotor.codegen.program import (
     Expression,
     MultiplyAdd,
@@ -22,9 +26,60 @@ from hamotor.codegen.program import (
     Product,
     Program,
     Sum,
+    children,
+    replace_children,
+    walk,
 )
 
 WIDTH = 4
+INLINED_OPERATIONS = 128
+"""Kernels of at most so many additions, multiplications and divisions are always inlined: for
+them the way of a result through memory costs more than the arithmetic."""
+PACKED_OPERATIONS = 48
+"""Kernels of at least so many operations are written four lanes at a time where they can be."""
+THREES_OPERATIONS = 80
+"""Those of at least so many that cannot be, three at a time."""
+
+
+def in_threes(algebra: Algebra, kernel: Kernel) -> Kernel:
+    """The kernel with its terms in the order of lanes of three, where it is to have them."""
+    cost = kernel.program.cost
+    if kernel.meaning is None or cost.calls or cost.total < THREES_OPERATIONS:
+        return kernel
+    if _fours(kernel.program) is not None:
+        return kernel
+    found = cyclic_program(algebra, kernel.program)
+    return kernel if found is None else proved(replace(kernel, program=found[0], turn=found[1]))
+
+
+def packed_body(kernel: Kernel) -> list[str]:
+    """What a kernel of many operations does first, where the scalar and the processor allow it."""
+    if kernel.shortcut is not None:
+        return []
+    packed = _fours(kernel.program)
+    where = "lanes::packed<S>"
+    if kernel.turn is not None:
+        packed = threes_lines(kernel.program, kernel.turn)
+        if kernel.program.cost.total <= INLINED_OPERATIONS:
+            where += " && !lanes::loops_become_lanes"
+    if packed is None:
+        return []
+    return [
+        f"if constexpr ({where}) {{",
+        "if (!std::is_constant_evaluated()) {",
+        "using lanes::four;",
+        "using lanes::turned;",
+        *packed,
+        "}",
+        "}",
+    ]
+
+
+def _fours(program: Program) -> list[str] | None:
+    cost = program.cost
+    if cost.calls or cost.total < PACKED_OPERATIONS:
+        return None
+    return packed_lines(program, whole=cost.total <= INLINED_OPERATIONS)
 
 
 class _Unpackable(Exception):
@@ -47,27 +102,25 @@ def packed_lines(program: Program, *, whole: bool) -> list[str] | None:
         return None
     wanted = dict(statements)
     packer = _Packer(program)
+    texts = []
     try:
-        texts = []
         for names in groups.values():
             for start in range(0, len(names), WIDTH):
-                lanes = packer.best_order(names[start : start + WIDTH], wanted)
-                texts.append((lanes, packer.text([wanted[name] for name in lanes])))
+                order = packer.best_order(names[start : start + WIDTH], wanted)
+                texts.append(packer.text([wanted[name] for name in order]))
+                vector = f"sum{len(texts)}"
+                packer.sums |= {name: (vector, lane) for lane, name in enumerate(order)}
     except _Unpackable:
         return None
-    place = {
-        name: (f"sum{index}", lane)
-        for index, (lanes, _) in enumerate(texts, 1)
-        for lane, name in enumerate(lanes)
-    }
-    said = " ".join(text for _, text in texts)
+    place = packer.sums
+    said = " ".join(texts)
     lines = [
         f"const S {name} = {cpp.expression_text(expression)};"
         for name, expression in program.bindings
         if name not in place and f"four({name})" in said
     ]
     lines += packer.loads
-    lines += [f"const auto sum{index} = {text};" for index, (_, text) in enumerate(texts, 1)]
+    lines += [f"const auto sum{index} = {text};" for index, text in enumerate(texts, 1)]
     return [*lines, *_returned(program, place)]
 
 
@@ -192,6 +245,104 @@ def _key(expression: Expression) -> tuple[str, ...]:
     return tuple(key)
 
 
+def threes_lines(program: Program, turn: Turn) -> list[str]:
+    """Statements of the function body: a program's threes as vectors, the first again as fourth.
+
+    What becomes itself is computed by itself, three sums that become each other by `total`.
+    """
+    threes = _Threes(turn)
+    for name, x in program.bindings:
+        if name not in turn.threes:
+            text = threes.alone(x)
+            threes.lines.append(f"const S {name} = {text};")
+            continue
+        three, place = turn.threes[name]
+        if not place:
+            threes.bind(three, x)
+    fields: dict[str, str] = {}
+    for name, x in program.outputs:
+        if name not in turn.outputs_threes:
+            fields[name] = threes.alone(x)
+            continue
+        three, place = turn.outputs_threes[name]
+        if not place:
+            text = threes.vector(x)
+            threes.lines.append(f"const auto all_{name} = {text};")
+            fields |= {n: f"all_{name}[{lane}]" for lane, (_, n) in enumerate(three)}
+    listed = ", ".join(f".{name} = {fields[name]}" for name, _ in program.outputs)
+    return [*threes.lines, f"return {{{listed}}};"]
+
+
+class _Threes:
+    def __init__(self, turn: Turn) -> None:
+        self._turn = turn
+        self._registers: dict[Three, str] = {}
+        self._bound: set[str] = set()
+        self._read: set[str] = set()
+        self.lines: list[str] = []
+
+    def bind(self, three: Three, x: Expression) -> None:
+        """A binding of three names."""
+        text = self.vector(x)
+        register = f"three_{three[0][1]}"
+        self._registers[three] = register
+        self._bound |= {name for _, name in three}
+        self.lines.append(f"const auto {register} = {text};")
+
+    def vector(self, x: Expression) -> str:
+        """An expression and what it becomes, as one of vectors."""
+        names = {node.text for node in walk(x) if isinstance(node, Name)}
+        return cpp.expression_text(
+            _of_vectors(substituted(x, {name: self._lanes(name) for name in sorted(names)}))
+        )
+
+    def alone(self, x: Expression) -> str:
+        """An expression that becomes itself, of numbers and totals of vectors."""
+        summed = self._totals(x)
+        for node in walk(summed):
+            if isinstance(node, Name) and node.text in self._bound - self._read:
+                three, place = self._turn.threes[node.text]
+                self.lines.append(f"const S {node.text} = {self._registers[three]}[{place}];")
+                self._read.add(node.text)
+        return cpp.expression_text(summed)
+
+    def _totals(self, x: Expression) -> Expression:
+        match x:
+            case Sum(Sum(a, b), c) if self._turn.image(a) == b and self._turn.image(b) == c:
+                return Name(f"lanes::total({self.vector(a)})")
+            case Name() | Number():
+                return x
+            case _:
+                return replace_children(x, map(self._totals, children(x)))
+
+    def _lanes(self, name: str) -> Expression:
+        if name not in self._turn.threes:
+            return Name(f"four({name})")
+        three, place = self._turn.threes[name]
+        if three not in self._registers:
+            first = three[0][1]
+            register = f"three_{first.replace('.', '_')}"
+            held = ", ".join(f"{'-' * (sign < 0)}{n}" for sign, n in (*three, three[0]))
+            self.lines.append(f"const auto {register} = four({held});")
+            self._registers[three] = register
+        lanes = Name(_turned(self._registers[three], _NEXT[place]))
+        return lanes if three[place][0] > 0 else Negative(lanes)
+
+
+_NEXT = ((1, 2, 3, 4), (2, 3, 4, 2), (3, 1, 2, 3))
+"""Three lanes in turn, from each on; the fourth is always the first again."""
+
+
+def _of_vectors(x: Expression) -> Expression:
+    match x:
+        case Number():
+            return Name(f"four({cpp.expression_text(x)})")
+        case Name():
+            return x
+        case _:
+            return replace_children(x, map(_of_vectors, children(x)))
+
+
 class _Packer:
     def __init__(self, program: Program) -> None:
         self._place = {
@@ -203,6 +354,7 @@ class _Packer:
         self._registers: dict[frozenset[str], list[str]] = {}
         self._shuffles: set[tuple[str, tuple[int, ...]]] = set()
         self.loads: list[str] = []
+        self.sums: dict[str, tuple[str, int]] = {}
 
     def best_order(self, names: Sequence[str], wanted: Mapping[str, Expression]) -> list[str]:
         """The order of lanes that takes the fewest shuffles that no other sum takes.
@@ -247,7 +399,10 @@ class _Packer:
         texts: list[str] = []
         while len(texts) < len(firsts):
             names = list(firsts[len(texts) : len(texts) + WIDTH])
-            if len(set(names)) == WIDTH and (register := self._bound(names)):
+            if sums := self.sums.get(names[0]):
+                vector, lane = sums
+                texts.append(f"lanes::each<{lane}>({vector})")
+            elif len(set(names)) == WIDTH and (register := self._bound(names)):
                 where = (register.index(name) for name in names)
                 texts += [f"lanes::each<{lane}>({self._name(register)})" for lane in where]
             else:
@@ -282,7 +437,9 @@ class _Packer:
     def _register(self, names: list[str]) -> list[str]:
         key = frozenset(names)
         if key not in self._registers:
-            if any(key & other for other in self._registers):
+            if not self.sums.keys().isdisjoint(key) or any(
+                key & other for other in self._registers
+            ):
                 raise _Unpackable  # not blocks of components: more loads than it saves
             order = sorted(names, key=self._first_place)
             self._registers[key] = order

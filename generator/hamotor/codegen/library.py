@@ -35,6 +35,7 @@ from hamotor.codegen.kernel import (
     sandwich_kernel,
     value_of,
 )
+from hamotor.codegen.lanes import in_threes
 from hamotor.codegen.matrix import matrix_kernels
 from hamotor.codegen.polynomial import Polynomial, PolynomialMultivector, apply_bilinear, scaled
 from hamotor.codegen.program import (
@@ -50,7 +51,7 @@ from hamotor.codegen.unit import unit_kernels
 from hamotor.errors import UsageError
 
 MAXIMUM_TERMS = 200_000
-PACKED_STEP = re.compile(r"four(_\w+)?|turned|lanes|result|sum\d+")
+PACKED_STEP = re.compile(r"(four|three|all)_\w+|four|turned|lanes|result|sum\d+")
 """What kernels name, or call, where they take four numbers at a time."""
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
 """Builds a kernel of an operand, a result, a namespace and what begins an error message."""
@@ -95,9 +96,15 @@ def library(spec: AlgebraSpec) -> tuple[Kernel, ...]:
         kernels += unit_kernels(spec.algebra, element)
     for group in spec.groups:
         kernels += group_kernels(spec, group)
+    kernels = [finished(spec.algebra, kernel) for kernel in kernels]
     for kernel in kernels:
         _check_symbols(spec, kernel)
-    return tuple(replace(kernel, program=kernel.program.without_unused()) for kernel in kernels)
+    return tuple(kernels)
+
+
+def finished(algebra: Algebra, kernel: Kernel) -> Kernel:
+    """The kernel without steps that nothing needs, in the order in which it becomes lanes."""
+    return in_threes(algebra, replace(kernel, program=kernel.program.without_unused()))
 
 
 def stepping_requests(spec: AlgebraSpec) -> tuple[Request, ...]:

@@ -11,7 +11,7 @@ from hamotor.codegen.algebra import Algebra, Blade, Rational, grade
 from hamotor.codegen.compiler import SourceFile, kernel_data, kernel_title
 from hamotor.codegen.element import Element
 from hamotor.codegen.kernel import Kernel
-from hamotor.codegen.library import LAWS, bilinear, library, request_kernel
+from hamotor.codegen.library import LAWS, bilinear, finished, library, request_kernel
 from hamotor.codegen.spec import (
     OPERATIONS,
     AlgebraSpec,
@@ -176,7 +176,7 @@ def _made_on_the_fly(
     request = Request(product, tuple(own), target, power)
     asked = str(request).removeprefix(f"{product} ")
     note = f'Not in generated/: for that, add "{asked}" to kernels.{product} in {spec.file}.'
-    return _text([(request_kernel(spec, request), (note,))])
+    return _text([(finished(spec.algebra, request_kernel(spec, request)), (note,))])
 
 
 def _text(kernels: Sequence[tuple[Kernel, Sequence[str]]]) -> str:

@@ -7,7 +7,7 @@ text, the polynomial it stands for (`expand`) and numbers in any arithmetic (`ev
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -111,6 +111,17 @@ def children(expression: Expression) -> tuple[Expression, ...]:
             return arguments
         case Select(x, positive, otherwise):
             return (x, positive, otherwise)
+
+
+def replace_children(expression: Expression, operands: Iterable[Expression]) -> Expression:
+    """The same operation of other operands, in the order of `children`."""
+    match expression:
+        case Name() | Number():
+            return expression
+        case Call(function, _):
+            return Call(function, tuple(operands))
+        case _:
+            return type(expression)(*operands)
 
 
 @dataclass(frozen=True)
@@ -263,15 +274,9 @@ def renamed(program: Program, names: Mapping[str, str]) -> Program:
     """The same program with other names for what it reads and gives."""
 
     def other(x: Expression) -> Expression:
-        match x:
-            case Name(text):
-                return Name(names.get(text, text))
-            case Number():
-                return x
-            case Call(function, arguments):
-                return Call(function, tuple(map(other, arguments)))
-            case _:
-                return type(x)(*map(other, children(x)))
+        if isinstance(x, Name):
+            return Name(names.get(x.text, x.text))
+        return replace_children(x, map(other, children(x)))
 
     return replace(
         program,
@@ -308,6 +313,11 @@ def _split_sums(expression: Expression, inside: bool = False) -> int:
         in_chain = isinstance(expression, MultiplyAdd) and child is expression.c
         found += _split_sums(child, in_chain)
     return found
+
+
+def one_level(expression: Expression) -> Polynomial:
+    """The polynomial in the names that an expression reads.  ValueError where it is none."""
+    return _expand(expression, {})
 
 
 def _expand(expression: Expression, known: Mapping[str, Polynomial]) -> Polynomial:

@@ -44,10 +44,12 @@ def unit_kernels(algebra: Algebra, element: Element) -> tuple[Kernel, ...]:
     value = value_of(m)
     square = poly.apply_bilinear(algebra.geometric, value, reversed_value(value))
     defect = poly.added(square, {0: ONE}, -1)
+    oriented = {b: c for c in element.components for b in c.embedding if len(c.embedding) == 1}
+    parts = (oriented.get(b, Component(algebra.blade_name(b), {b: 1})) for b in sorted(defect))
     result = Element(
         f"{element.name}Defect",
         "d" if element.symbol != "d" else "defect",
-        tuple(Component(algebra.blade_name(b), {b: 1}) for b in sorted(defect)),
+        tuple(parts),
         {},
         False,
         f"M ~M − 1 of a {element.name}: zero on the group.",
@@ -89,10 +91,10 @@ def _correction(algebra: Algebra, m: Parameter, d: Parameter) -> Kernel:
     halves: list[tuple[str, Expression]] = []
     named: PolynomialMultivector = {}
     for component in d.element.components:
-        ((blade, _),) = component.embedding.items()
+        ((blade, sign),) = component.embedding.items()
         name = f"half_{component.name}"
         halves.append((name, Product(number(Fraction(-1, 2)), Name(f"{d.name}.{component.name}"))))
-        named[blade] = {(name,): 1}
+        named[blade] = {(name,): sign}
     value = value_of(m)
     whole = poly.apply_bilinear(algebra.geometric, value_of(d), value)
     meaning: dict[str, Polynomial] = {
