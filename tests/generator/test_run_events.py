@@ -6,7 +6,9 @@ import itertools
 import json
 import math
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -116,6 +118,33 @@ def test_rows_at_times_leave_the_steps_as_they_are(stone: hamotor.Simulation) ->
     near = stone.run(end=0.4, step=step)
     assert np.abs(near.motor()[-1] - at.motor()[2]).max() < 1e-7
     assert at.report["every"] is None
+
+
+@pytest.mark.parametrize("ensemble", [False, True])
+@pytest.mark.parametrize(
+    ("records", "span", "problem"),
+    [
+        ({"times": (0.5, 1.0)}, {"end": 0.0}, "end must be a finite number"),
+        ({"interval": 0.5}, {"end": 0.0}, "end must be a finite number"),
+        ({"interval": 0.5}, {"step": 0.0}, "step must be a positive number"),
+        ({"interval": 0.5}, {"end": 1e300, "step": 1e-300}, "Take a longer step"),
+    ],
+)
+def test_no_way_to_the_end_is_an_error_whatever_is_recorded(
+    stone: hamotor.Simulation,
+    ensemble: bool,
+    records: dict[str, Any],
+    span: dict[str, float],
+    problem: str,
+) -> None:
+    recorded = replace(stone, **records)
+    run = partial(hamotor.run_ensemble, recorded, states=stone.state[np.newaxis])
+    with pytest.raises(UsageError, match=problem):
+        (run if ensemble else recorded.run)(**span)
+
+
+def test_an_interval_longer_than_the_run_keeps_two_rows(stone: hamotor.Simulation) -> None:
+    np.testing.assert_array_equal(stone.run(end=1e-30, step=1e-31, interval=1e308).t, [0, 1e-30])
 
 
 def test_intervals_are_steps_where_they_can_be_and_times_elsewhere(

@@ -58,6 +58,12 @@ def test_every_must_be_a_step_at_least() -> None:
         plan("euler", end=1.0, step=0.1, every=0)
 
 
+def test_every_fits_the_library_that_counts_the_steps() -> None:
+    assert plan("euler", end=1.0, step=0.1, every=10**18).every == 10**18
+    with pytest.raises(UsageError, match=r"at most 1e\+18, not 1000000000000000001"):
+        plan("euler", end=1.0, step=0.1, every=10**18 + 1)
+
+
 def test_more_steps_than_any_run_could_take_are_refused() -> None:
     with pytest.raises(UsageError, match="longer step"):
         plan("euler", end=1e9, step=1e-9, every=1)

@@ -32,7 +32,7 @@ from hamotor.run.library import Description, Rows
 from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.random_numbers import MOST_SEEDS
 from hamotor.run.report import Report, to_json
-from hamotor.run.runner import Interruption, Plan, plan
+from hamotor.run.runner import Interruption, Plan, plan, refuse_impossible_span
 from hamotor.run.simulation import ROWS, Compiled, Simulation, at_interval, load
 from hamotor.run.statistics import quantiles
 
@@ -552,6 +552,7 @@ def _planned(
             f"{simulation.name}: has a tolerance of the final state, which is verified for single "
             "runs only; give a step or a local tolerance."
         )
+    refuse_impossible_span(end, step)
     if every is None and times is None and interval is None:
         every, interval = simulation.every, simulation.interval
         if simulation.times is not None:

@@ -41,6 +41,7 @@ _LARGEST_GROWTH = 8
 _FIRST_PATIENCE = 256
 _ROWS_PER_CHUNK = 1 << 15
 _MOST_STEPS = 10**15
+_MOST_EVERY = 10**18
 _VANISHING = 1e-12
 _ALIKE = 8 * float(np.finfo(float).eps)
 
@@ -106,25 +107,36 @@ def plan(
     Raises UsageError unless end (s) is finite and not zero, step (s) finite and of the sign of
     end or positive, every positive, and times go from 0 to end.
     """
-    if not (math.isfinite(end) and end != 0):
-        raise UsageError(f"end must be a finite number of seconds and not zero, not {end!r}.")
-    if not (math.isfinite(step) and step != 0 and (step > 0 or end < 0)):
-        raise UsageError(f"step must be a positive number of seconds, not {step!r}.")
+    refuse_impossible_span(end, step)
     if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0):
         raise UsageError(f"a local tolerance must be a positive number, not {tolerance!r}.")
     step = math.copysign(step, end)
-    if every < 1:
-        raise UsageError(f"every must be a whole number of steps, at least 1, not {every}.")
+    if not 1 <= every <= _MOST_EVERY:
+        raise UsageError(
+            f"every must be a whole number of steps, at least 1 and at most {_MOST_EVERY:.0e}, "
+            f"not {every}."
+        )
     quotient = end / step
+    rounding = max(1e-9, 4 * np.finfo(float).eps * quotient)
+    steps = max(1, math.ceil(quotient - rounding))
+    chosen = None if times is None else _checked_times(times, end)
+    return Plan(method, end, end / steps, steps, every, step, chosen, tolerance)
+
+
+def refuse_impossible_span(end: float, step: float | None = None) -> None:
+    """UsageError unless steps of `step` (s), where one is given, can reach `end` (s)."""
+    if not (math.isfinite(end) and end != 0):
+        raise UsageError(f"end must be a finite number of seconds and not zero, not {end!r}.")
+    if step is None:
+        return
+    if not (math.isfinite(step) and step != 0 and (step > 0 or end < 0)):
+        raise UsageError(f"step must be a positive number of seconds, not {step!r}.")
+    quotient = abs(end / step)
     if not quotient < _MOST_STEPS:
         raise UsageError(
             f"end / step = {quotient:.3g} steps, more than the {_MOST_STEPS:.0e} a run may have. "
             "Take a longer step or an earlier end."
         )
-    rounding = max(1e-9, 4 * np.finfo(float).eps * quotient)
-    steps = max(1, math.ceil(quotient - rounding))
-    chosen = None if times is None else _checked_times(times, end)
-    return Plan(method, end, end / steps, steps, every, step, chosen, tolerance)
 
 
 def _checked_times(times: Sequence[float] | Vector, end: float) -> Vector:

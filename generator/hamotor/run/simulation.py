@@ -30,7 +30,14 @@ from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.remembered import Remembered, key_of
 from hamotor.run.report import Origin, report, to_json
 from hamotor.run.result import Run, RunFailed, RunInterrupted, units_of
-from hamotor.run.runner import Interruption, Outcome, Recorder, integrate, plan
+from hamotor.run.runner import (
+    Interruption,
+    Outcome,
+    Recorder,
+    integrate,
+    plan,
+    refuse_impossible_span,
+)
 from hamotor.run.tolerance import meet_tolerance
 from hamotor.scene.draws import ALIKE, Ensemble
 
@@ -267,6 +274,7 @@ class Simulation:
             step, tolerance = self.step, self.tolerance
         if method is None and tolerance is None and local_tolerance is None:
             local_tolerance = self.local_tolerance
+        refuse_impossible_span(end, step)
         if every is None and times is None and interval is None:
             interval = self.interval
             if self.times is not None:  # an earlier end than the scene's leaves the later ones out
@@ -553,7 +561,7 @@ def at_interval(
     """When to record at the multiples of an interval: at times, or every so many steps."""
     if not (math.isfinite(interval) and interval > 0):
         raise UsageError(f"interval must be a positive number of seconds, not {interval!r}.")
-    count = abs(end) / interval
+    count = max(1.0, abs(end) / interval)  # a longer one gives the same two rows
     if step is not None:
         steps = abs(end / step)
         whole = round(steps) / count  # steps from row to row, of a step that divides the end
