@@ -233,6 +233,9 @@ def test_statistics_are_those_of_the_members() -> None:
         np.testing.assert_allclose(
             run.quantile("bob.position.x", level), np.quantile(rows, level, axis=0), rtol=1e-14
         )
+    near = replace(ensemble_of_toys().ensemble, quantiles=(0.99999997, 0.99999998))
+    both = run_ensemble(replace(ensemble_of_toys(), ensemble=near), members)
+    assert {"energy.q0.99999997", "energy.q0.99999998"} < set(both.statistics)
     # x = cos t + p sin t of a uniform p, but for the error of the step.
     assert run.deviation("bob.position.x")[-1] == pytest.approx(
         np.sin(0.5) * run.deviation("bob.momentum.e01")[0], rel=1e-3
@@ -443,6 +446,15 @@ def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:
             live.advance(20, 0, None)
             assert (live.state() == run.states[member]).all()
     assert "19 members, given states, 20 steps of 0.005 s" in run.summary()
+
+
+def test_the_scenes_local_tolerance_is_the_ensembles(bounce: Simulation) -> None:
+    own = replace(bounce, method="rkmk87", local_tolerance=1e-10, step=0.5, every=1)
+    asked = run_ensemble(own, 9, method="rkmk87", local_tolerance=1e-10)
+    found = run_ensemble(own, 9)
+    assert found.report["local_tolerance"] == 1e-10
+    assert (found.states == asked.states).all()
+    assert found.report["conserved"]["energy"]["max_relative_error"] < 1e-8
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from hamotor.run.library import Description
 from hamotor.run.report import Report
 from hamotor.run.runner import Plan
 from hamotor.run.sampling import numbers_each
+from hamotor.scene.draws import quantile_name
 
 _SHOWN_COLUMNS = 12
 
@@ -59,7 +60,13 @@ def ensemble_report(
     job, plan, description = origin.job, origin.plan, origin.description
     how = description.ensemble
     index = description.column_index
-    told = ("mean", "sd", "min", "max", *(_quantile_names(job) if len(total.sample) else ()))
+    told = (
+        "mean",
+        "sd",
+        "min",
+        "max",
+        *(map(quantile_name, job.ensemble.quantiles) if len(total.sample) else ()),
+    )
     return {
         "scene": origin.scene,
         "algebra": description.algebra,
@@ -142,10 +149,6 @@ def ensemble_report(
             "fma": description.fma,
         },
     }
-
-
-def _quantile_names(job: Job) -> list[str]:
-    return [f"q{level:g}" for level in job.ensemble.quantiles]
 
 
 def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> str:

@@ -35,6 +35,7 @@ from hamotor.run.report import Report, to_json
 from hamotor.run.runner import Interruption, Plan, plan, refuse_impossible_span
 from hamotor.run.simulation import ROWS, Compiled, Simulation, at_interval, load
 from hamotor.run.statistics import quantiles
+from hamotor.scene.draws import quantile_name
 
 if TYPE_CHECKING:
     from os import PathLike
@@ -96,7 +97,7 @@ class EnsembleRun:
 
     def quantile(self, column: str, level: float) -> Array:
         """A quantile that the scene asks for, at the recorded times."""
-        return self._of(column, f"q{level:g}")
+        return self._of(column, quantile_name(level))
 
     @property
     def states(self) -> Rows:
@@ -250,7 +251,9 @@ def run_ensemble(
     seed = simulation.ensemble.seed if seed is None else seed
     if not 0 <= seed < MOST_SEEDS:
         raise UsageError(f"a seed is a whole number from 0 and below 2^64, not {seed}.")
-    if local_tolerance is not None and step is None:
+    if method is None and local_tolerance is None:
+        local_tolerance = simulation.local_tolerance
+    elif local_tolerance is not None and step is None:
         step = abs(simulation.end if end is None else end) / ROWS
     planned, recorded = _planned(
         simulation, chosen, end, step, local_tolerance, every, times, interval
@@ -484,7 +487,7 @@ class _Gathered:
             found[f"{column.name}.min"] = moments.low[there, k]
             found[f"{column.name}.max"] = moments.high[there, k]
             for level, values in zip(levels, sampled, strict=True):
-                found[f"{column.name}.q{level:g}"] = values[there, k]
+                found[f"{column.name}.{quantile_name(level)}"] = values[there, k]
         return found
 
 

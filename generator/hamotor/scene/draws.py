@@ -141,5 +141,10 @@ def _body_from_json(said: Mapping[str, Any]) -> BodyDraws:
     )
 
 
+def quantile_name(level: float) -> str:
+    """`q0.25`: what statistics call a quantile, in all digits of its level."""
+    return f"q{float(level)!r}"
+
+
 ALIKE = Ensemble()
 """Nothing differs."""
