@@ -70,6 +70,7 @@ MISTAKES: dict[str, tuple[str, str, str, list[str]]] = {
     "unknown key of limits": (TOP, "[output]", "[limits]\nbody = 3\n[output]", ['[limits]: unknown key "body"']),
     "unknown body": (TOP, 'body = "top"', 'body = "topp"', ['interaction 2: unknown body "topp"; bodies are "top". Did you mean "top"?']),
     "unknown other body": (TOP, ANCHOR, 'other = "second"', ['interaction 2: unknown body "second"; bodies are "top".']),
+    "body called like a word": (TOP.replace('"top"', '"position"'), 'type = "gravity"\nacceleration = [0, 0, -9.81]', 'type = "potential"\nexpression = "position.z"', ['interaction 1: the body "position" has the name of something else; rename it']),
     "unknown interaction": (TOP, '"gravity"', '"gravty"', ['interaction 1: unknown type "gravty"; types are "gravity", "spring", "potential", "newtonian", "dipole", "force", "torque", "damping". Did you mean "gravity"?']),
     "unknown algebra": (TOP, '"pga3"', '"pga5"', ['unknown algebra "pga5"; algebras are "cga2", "cga3", "cl3", "pga2", "pga3", "pga4", "sta".', "Did you mean"]),
     "unknown group": (TOP, PGA3, f'{PGA3}\ngroup = "SE4"', ['unknown group "SE4"; groups of pga3 are "SE3", "SO3", "T3".', "Did you mean"]),
@@ -81,7 +82,7 @@ MISTAKES: dict[str, tuple[str, str, str, list[str]]] = {
     "missing mass": (TOP, MASS, "", ['body 1 "top": missing "mass"', "kg"]),
     "missing inertia": (TOP, INERTIA, "", ['missing "inertia" or "box" or "ellipsoid" or "cylinder" or "points"']),
     "missing planar inertia": (PLATE, "inertia = 2.0", "", ['missing "inertia" or "box" or "disk" or "points"']),
-    "missing type": (TOP, 'type = "gravity"', "", ['interaction 1: missing "type"']),
+    "missing type": (TOP, 'type = "gravity"', "", ['interaction 1: missing "type": gravity, spring, potential']),
     "missing acceleration": (TOP, "acceleration = [0, 0, -9.81]", "", ['interaction 1: missing "acceleration"']),
     "missing anchor": (TOP, ANCHOR, "", ['interaction 2: missing "anchor" or "other"']),
     "missing stiffness": (TOP, "stiffness = 50.0", "", ['interaction 2: missing "stiffness"']),
@@ -238,6 +239,22 @@ def test_the_message_of_the_style_guide() -> None:
     assert str(caught.value) == (
         'heavy_top.toml: interaction 2: unknown body "topp"; bodies are "top". Did you mean "top"?'
     )
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ("p1 = 7", '[hamiltonian]: parameters: "p1" is what a coordinate of the body is called'),
+        ("xx = 7", '"xx" is what a coordinate of the body is called; rename it'),
+        ("s = 7", '"s" is what a coordinate of the body is called; rename it'),
+        ("k = [1, 2, 3], k_x = 7", '"k_x" is a number of its own and one of a vector; rename one'),
+    ],
+)
+def test_a_parameter_has_a_symbol_of_its_own(parameters: str, message: str) -> None:
+    general = TOP[: TOP.index("mass")] + "[hamiltonian]\nexpression = " + '"norm_squared(P)"\n'
+    text = f"{general}parameters = {{ {parameters} }}\n{TOP[TOP.index('[time]') :]}"
+    with pytest.raises(UsageError, match=re.escape(message)):
+        parse_scene(text.encode(), name="top", file="top.toml")
 
 
 def test_too_many_bodies_say_the_cap_and_how_to_lift_it() -> None:

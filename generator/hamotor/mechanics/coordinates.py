@@ -9,6 +9,7 @@ M exp(εE_i), from which every forque follows: F_b,i = Σ (∂H/∂q) δ_i q.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -70,6 +71,16 @@ class Coordinates:
 
     def _symbol(self, name: str) -> Expr:
         return sympy.Symbol(self.prefix + name, real=True)
+
+    def has_symbol(self, name: str) -> bool:
+        """Whether a symbol of the body has this name, or a point asked for later may have it."""
+        own = name.removeprefix(self.prefix)
+        components = {c.name for c in self.group.element.components}
+        numbers = {x for g in self.group.generators for x in (g.rate, g.momentum)}
+        return name.startswith(self.prefix) and (
+            own in {"scale", *components, *numbers}
+            or re.fullmatch(r"[RL][0-9]{2}|(x|y[0-9]+)[xyzw]", own) is not None
+        )
 
     @cached_property
     def motor(self) -> tuple[Expr, ...]:

@@ -80,6 +80,9 @@ def vocabulary(bodies: Sequence[Speaker], parameters: Mapping[str, Expr]) -> Voc
             of_body(linear, lambda b, n=numbers: _vector([n(b)[i] for i in moving]))
     if all(b.kinetic is not None for b in bodies):
         of_body("kinetic", lambda b: b.kinetic)
+    for name in speakers:
+        if name in values or name == "pi":
+            raise UsageError(f'the body "{name}" has the name of something else; rename it')
     for name, symbol in parameters.items():
         if name in values or name in functions or name in speakers or name == "pi":
             raise UsageError(f'the parameter "{name}" has the name of something else; rename it')

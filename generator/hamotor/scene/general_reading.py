@@ -377,17 +377,21 @@ def _motor(
 def _parameters(table: Table, system: _System, reserved: str) -> dict[str, Any]:
     """Symbols of the table's parameters, their values put into the system."""
     found: dict[str, Any] = {}
-    for name, value in table.parameters("parameters").items():
-        if isinstance(value, tuple):
-            symbols = tuple(
-                sympy.Symbol(f"{reserved}{name}_{axis}", real=True) for axis in "xyzw"[: len(value)]
-            )
-            system.parameters |= dict(zip(symbols, _numbers(value), strict=True))
-            found[name] = Vector(symbols)
-        else:
-            symbol = sympy.Symbol(reserved + name, real=True)
-            system.parameters[symbol] = _number(value)
-            found[name] = symbol
+    place = "parameters"
+    for name, value in table.parameters(place).items():
+        several = isinstance(value, tuple)
+        values = value if isinstance(value, tuple) else (value,)
+        symbols = []
+        for axis, x in zip("xyzw", values, strict=False):
+            own = f"{name}_{axis}" if several else name
+            symbol = sympy.Symbol(reserved + own, real=True)
+            if symbol in system.parameters:
+                table.fail(f'"{own}" is a number of its own and one of a vector; rename one', place)
+            if any(draft.coordinates.has_symbol(symbol.name) for draft in system.drafts):
+                table.fail(f'"{own}" is what a coordinate of the body is called; rename it', place)
+            system.parameters[symbol] = _number(x)
+            symbols.append(symbol)
+        found[name] = Vector(tuple(symbols)) if several else symbols[0]
     return found
 
 
@@ -428,7 +432,7 @@ def _vocabulary(
     try:
         return vocabulary(speakers, parameters)
     except UsageError as error:
-        table.fail(str(error), "parameters")
+        table.fail(str(error))
 
 
 def _interaction(
@@ -436,7 +440,7 @@ def _interaction(
 ) -> None:
     place = f"interaction {number}"
     kinds = tuple(schema.INTERACTIONS)
-    kind = Table(top.file, place, values, schema.GRAVITY, view).choice("type", kinds, "types")
+    kind = Table(top.file, place, values, schema.UNTYPED, view).choice("type", kinds, "types")
     table = Table(top.file, place, values, schema.INTERACTIONS[kind], view)
     table.refuse_unknown_keys()
     if not system.drafts[0].coordinates.space.affine and kind != "potential":

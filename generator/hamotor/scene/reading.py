@@ -476,7 +476,7 @@ def _interactions(top: Table, bodies: tuple[Body, ...], most: int) -> tuple[Inte
     for number, values in enumerate(tables, 1):
         place = f"interaction {number}"
         kinds = tuple(schema.INTERACTIONS)
-        untyped = Table(top.file, place, values, schema.GRAVITY, top.group)
+        untyped = Table(top.file, place, values, schema.UNTYPED, top.group)
         kind = untyped.choice("type", kinds, "types")
         table = Table(top.file, place, values, schema.INTERACTIONS[kind], top.group)
         table.refuse_unknown_keys()

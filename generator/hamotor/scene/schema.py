@@ -317,6 +317,18 @@ POINT = Section(
     ),
 )
 
+UNTYPED = Section(
+    "[[interaction]]",
+    "an interaction",
+    (
+        Key(
+            "type",
+            "one of",
+            "gravity, spring, potential, newtonian, dipole, force, torque or damping",
+        ),
+    ),
+)
+
 GRAVITY = Section(
     "[[interaction]]",
     "gravity",
