@@ -10,7 +10,7 @@ import json
 import math
 import random
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,12 @@ from numpy.typing import NDArray
 import hamotor
 from hamotor.codegen.algebra import Algebra, reverse_sign
 from hamotor.codegen.spec import bundled_algebra
+from hamotor.mechanics.evaluation import evaluated
 from hamotor.mechanics.hamiltonian import coadjoint
 from hamotor.mechanics.system import System
 from hamotor.scene import GeneralScene, Scene, parse_scene, read_scene
 from hamotor.scene.general import product
+from hamotor.scene.invariants import at_the_start
 from hamotor.scene.reading import BUNDLED
 
 ORACLES = Path(__file__).resolve().parents[1] / "oracles"
@@ -393,6 +395,67 @@ strength = {strength}
         return force, torque
 
     expect(load(text, tmp_path).run(step=1 / 4000), *drawn.at_the_end(acting))
+
+
+FAR_APART = """
+{algebra}
+[[body]]
+name = "one"
+{one}
+orientation = {{ axis = [1, 2, 3], angle = 0.7 }}
+[[body]]
+name = "two"
+{two}
+position = [3, -1, 2]
+orientation = {{ axis = [0, 2, -1], angle = 2 }}
+{more}
+[[interaction]]
+type = "newtonian"
+body = "one"
+other = "two"
+constant = 1.0
+[time]
+end = 1
+step = 0.1
+"""
+
+
+def energy_of_two(one: str, two: str, algebra: str = 'algebra = "pga3"', more: str = "") -> float:
+    """At the start, of two bodies at rest."""
+    text = FAR_APART.format(algebra=algebra, one=one, two=two, more=more)
+    found = parse_scene(text.encode(), name="pair", file="pair.toml")
+    general = found.general if isinstance(found, Scene) else found
+    values = at_the_start(general.hamiltonian, general.bodies)
+    return float(evaluated([general.hamiltonian.energy], values)[0])
+
+
+def of_axes(center: Sequence[float], size: float = 0.1, *, points: bool = True) -> str:
+    """Point masses of 0.5 kg on three axes about a centre, or the same mass and second moments."""
+    lengths = (0.6 * size, 0.3 * size, size)
+    if points:
+        at = np.array(center) + [sign * x for x in np.diag(lengths) for sign in (1, -1)]
+        return f"points = [{', '.join(f'{{ mass = 0.5, at = {place.tolist()} }}' for place in at)}]"
+    a, b, c = (x**2 for x in lengths)
+    return f"mass = 3\ninertia = [{b + c}, {a + c}, {a + b}]\ncenter_of_mass = {list(center)}"
+
+
+@pytest.mark.parametrize(("one", "two"), [(True, False), (False, True), (False, False)])
+def test_bodies_attract_each_other_up_to_second_moments(one: bool, two: bool) -> None:
+    here, there = [0.2, 0, -0.1], [0, 0.3, 0]
+    exact = energy_of_two(of_axes(here), of_axes(there))
+    as_points = energy_of_two(of_axes(here, 1e-6), of_axes(there, 1e-6))
+    assert abs(as_points / exact - 1) > 1e-5
+    found = energy_of_two(of_axes(here, points=one), of_axes(there, points=two))
+    assert found == pytest.approx(exact, rel=1e-7)
+
+
+def test_second_moments_grow_with_the_body() -> None:
+    algebra, more = 'algebra = "cga3"\ngroup = "Sim3"', "scale = 2.5"
+    center = [0.0, 0.0, 0.0]
+    given, small = of_axes(center, 0.03, points=False), of_axes(center, 0.03)
+    exact = energy_of_two(small, small, algebra, more)
+    assert abs(energy_of_two(given, given, algebra) / exact - 1) > 1e-5
+    assert energy_of_two(given, given, algebra, more) == pytest.approx(exact, rel=1e-7)
 
 
 def test_a_dipole_in_the_field_of_another(tmp_path: Path) -> None:

@@ -55,10 +55,18 @@ def newtonian_of_moments(
     attractor: Numbers,
     strength: Expr,
 ) -> Expr:
-    """MacCullagh's formula, −μ m/r − μ (tr J − 3 n·J n)/2r³: exact up to second moments.
+    """MacCullagh's formula, −μ (m/r + q): exact up to second moments, q those of `quadrupole`."""
+    d = _difference(attractor, body.at(tuple(center)))
+    return -strength * (mass / sympy.sqrt(_dot(d, d)) + quadrupole(body, center, tensor, attractor))
+
+
+def quadrupole(
+    body: Coordinates, center: Numbers, tensor: Sequence[Numbers], attractor: Numbers
+) -> Expr:
+    """s² (tr J − 3 n·J n)/2r³, what second moments add to m/r.
 
     tensor: J about the centre of mass, body frame, (3, 3).  n is the direction of the attractor
-    seen from the body.
+    seen from the body, s by how much the body is enlarged.
     """
     d = _difference(attractor, body.at(tuple(center)))
     square = _dot(d, d)
@@ -68,7 +76,7 @@ def newtonian_of_moments(
         tensor[j][k] * seen[j] * seen[k] for j in range(3) for k in range(3) if tensor[j][k]
     )
     r = sympy.sqrt(square)
-    return -strength * (mass / r + (trace - 3 * quadratic / square) / (2 * r**3))
+    return body.scale**2 * (trace - 3 * quadratic / square) / (2 * r**3)
 
 
 VACUUM = sympy.Rational(1, 10**7)

@@ -53,7 +53,6 @@ class _Draft:
     coordinates: Coordinates
     motor: tuple[float, ...]
     mass: MassDistribution | None
-    tensor: Any
     kinetic_matrix: Any
 
     @property
@@ -273,11 +272,9 @@ class _Reader:
         prefix = f"{name}." if self.several else ""
         pivot = () if self.view.translates else _numbers(table.vector("position"))
         body = Coordinates(name, self.algebra, self.group, prefix, pivot)
-        mass, tensor = _mass(table, body, self.mass_distribution)
+        mass = _mass(table, body, self.mass_distribution)
         matrix = _kinetic_matrix(table, body, mass)
-        return _Draft(
-            table, name, body, _motor(table, body, self.orientation), mass, tensor, matrix
-        )
+        return _Draft(table, name, body, _motor(table, body, self.orientation), mass, matrix)
 
 
 SHAPES = ("inertia", "box", "ellipsoid", "cylinder", "disk", "points", "second_moments")
@@ -285,9 +282,9 @@ SHAPES = ("inertia", "box", "ellipsoid", "cylinder", "disk", "points", "second_m
 
 def _mass(
     table: Table, body: Coordinates, mass_distribution: MassReader
-) -> tuple[MassDistribution | None, Any]:
+) -> MassDistribution | None:
     if not any(table.has(key) for key in (*SHAPES, "mass")):
-        return None, None
+        return None
     if not body.space.affine:
         table.fail(f"{table.group.name} bends straight lines: a mass has no kinetic energy on it")
     if table.has("kinetic_matrix"):
@@ -304,7 +301,7 @@ def _mass(
             tuple(mass * center[i] * center[j] + (diagonal[i] if i == j else 0) for j in d)
             for i in d
         )
-        return MassDistribution(mass, center, moments), None
+        return MassDistribution(mass, center, moments)
     given, at, tensor = mass_distribution(table)
     mass, center = Fraction(*_ratio(given)), exact(at)
     rows = [exact(row) for row in tensor]
@@ -314,7 +311,7 @@ def _mass(
         points = tuple(
             (Fraction(*_ratio(p["mass"])), exact(p["at"])) for p in table.tables("points")
         )
-    return MassDistribution(mass, center, moments, points), rows
+    return MassDistribution(mass, center, moments, points)
 
 
 def _ratio(x: float) -> tuple[int, int]:
@@ -530,10 +527,19 @@ def _newtonian(table: Table, system: _System, number: int) -> None:
         table.fail(f'"{draft.name}" does not attract itself', "other")
     constant = system.number(table, number, "constant")
     one, two = _weights(table, draft), _weights(table, other)
-    system.add_potential(constant * interactions.newtonian_of_points(one, two))
+    energy = interactions.newtonian_of_points(one, two)
+    for extended, attracting in ((draft, two), (other, one)):
+        if _has_second_moments(extended):
+            center, tensor = _center_and_tensor(extended)
+            energy -= sum(
+                weight * interactions.quadrupole(extended.coordinates, center, tensor, place)
+                for weight, place in attracting
+            )
+    system.add_potential(constant * energy)
     system.acting.append(
         f"Newtonian attraction between {draft.name} and {other.name},"
-        f" G = {table.number('constant'):g} m^3/(kg s^2), point by point"
+        f" G = {table.number('constant'):g} m^3/(kg s^2), {draft.name} {_as(draft)},"
+        f" {other.name} {_as(other)}"
     )
 
 
@@ -546,25 +552,38 @@ def _weights(table: Table, draft: _Draft) -> list[tuple[Expr, tuple[Expr, ...]]]
     ]
 
 
+def _has_second_moments(draft: _Draft) -> bool:
+    """Whether it attracts as more than the points in its file: known in space only."""
+    return draft.mass is not None and not draft.mass.points and draft.coordinates.dimension == 3
+
+
 def _as(draft: _Draft) -> str:
     assert draft.mass is not None
-    return "point by point" if draft.mass.points else "up to second moments"
+    if _has_second_moments(draft):
+        return "up to second moments"
+    return "point by point" if draft.mass.points else "as a point at its centre of mass"
+
+
+def _center_and_tensor(draft: _Draft) -> tuple[tuple[Expr, ...], list[tuple[Expr, ...]]]:
+    """The centre of mass and J about it: tr S 1 − S of the second moments S about it."""
+    assert draft.mass is not None
+    mass, center = draft.mass.mass, draft.mass.center
+    d = range(len(center))
+    about = [[draft.mass.moments[i][j] - mass * center[i] * center[j] for j in d] for i in d]
+    trace = sum((about[k][k] for k in d), Fraction(0))
+    tensor = [tuple(_rational((trace if i == j else 0) - about[i][j]) for j in d) for i in d]
+    return tuple(map(_rational, center)), tensor
 
 
 def _attracted(table: Table, draft: _Draft, center: Sequence[Expr], strength: Expr) -> Expr:
     if draft.mass is None:
         table.fail(f'body "{draft.name}" has no mass to be attracted')
-    if draft.mass.points or draft.tensor is None or table.group.dimension != 3:
+    if not _has_second_moments(draft):
         weighted = _weights(table, draft)
         return interactions.newtonian_of_points(weighted, [(strength, tuple(center))])
-    return interactions.newtonian_of_moments(
-        draft.coordinates,
-        _rational(draft.mass.mass),
-        tuple(map(_rational, draft.mass.center)),
-        [tuple(map(_rational, row)) for row in draft.tensor],
-        center,
-        strength,
-    )
+    at, tensor = _center_and_tensor(draft)
+    mass = _rational(draft.mass.mass)
+    return interactions.newtonian_of_moments(draft.coordinates, mass, at, tensor, center, strength)
 
 
 def _dipole(table: Table, system: _System, _number_of: int) -> None:

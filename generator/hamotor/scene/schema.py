@@ -429,7 +429,8 @@ NEWTONIAN = Section(
             "type",
             "one of",
             "towards a point of the world, or between two bodies; a body given by points attracts"
-            " as those, any other one up to its second moments",
+            " as those, any other one up to its second moments, in the plane and in four dimensions"
+            " as a point at its centre of mass",
             example='"newtonian"',
         ),
         Key("body", "name", "the body attracted"),
