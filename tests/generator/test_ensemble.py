@@ -427,6 +427,39 @@ def test_members_have_parameters_of_their_own(bounce: Simulation) -> None:
     assert (alone.states[0] == run.states[13]).all()
 
 
+def test_what_is_conserved_is_so_with_every_members_parameters(tmp_path: Path) -> None:
+    """The scene's own field is zero and its pull along e1, so that it keeps more than members."""
+    pull = """
+[[interaction]]
+type = "potential"
+expression = "dot(k, position)"
+parameters = { k = [2.0, 0, 0] }
+"""
+    text = BOUNCE.replace("[0, 0, -9.0]", "[0, 0, 0]")
+    text = (
+        text[: text.index('[[interaction]]\ntype = "spring"')] + pull + text[text.index("[time]") :]
+    )
+    text = (
+        text[: text.index("[[ensemble")]
+        + """
+[[ensemble.parameter]]
+name = "acceleration_z"
+interaction = 1
+distribution = { low = -3, high = 3 }
+[[ensemble.parameter]]
+name = "k_x"
+interaction = 2
+distribution = { low = 1, high = 3 }
+"""
+    )
+    path = tmp_path / "pulled.toml"
+    path.write_text(text)
+    run = run_ensemble(path, 5)
+    errors = {name: q["max_relative_error"] for name, q in run.report["conserved"].items()}
+    assert set(errors) == {"energy", "spatial_momentum.e02"}
+    assert max(errors.values()) < 1e-8
+
+
 def test_show_says_in_what_members_differ(bounce: Simulation) -> None:
     assert bounce.read is not None
     shown = account(bounce.read())

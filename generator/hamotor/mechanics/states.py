@@ -6,6 +6,7 @@ import random
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Any
 
 import mpmath
@@ -91,6 +92,9 @@ def _state(system: System, drawn: random.Random, factors: list[Number]) -> State
         momenta.append([factors[k] * _number(drawn) for _ in body.momenta])
         values |= motor_values(body, k, motor)
         values |= momentum_values(body, k, momenta[k])
+    for symbol in system.drawn:
+        x = real(Fraction(*system.hamiltonian.parameters[symbol].as_numer_denom()))
+        values[system.names[symbol]] = x * (1 + _number(drawn) / 2) if x else _number(drawn)
     chosen = functions(drawn)
     found = system.gradient.evaluate(values, chosen)
     generators = system.hamiltonian.group.generators

@@ -94,12 +94,14 @@ class Conserved:
 def conserved(hamiltonian: Hamiltonian, system: System | None = None) -> tuple[Conserved, ...]:
     """The energy or its balance, spatial momenta, own momenta and Casimirs that are constant.
 
-    system: the programs of the Hamiltonian, if they are there already.
+    system: the programs of the Hamiltonian, if they are there already. What they leave open of
+        the parameters may have any value.
     """
+    system = system or System(hamiltonian)
     found = [_energy(hamiltonian)]
     count = len(hamiltonian.group.generators) + 1 + CHECKS
     with mpmath.workdps(DIGITS), suppress(Undefined):
-        states = list(islice(random_states(system or System(hamiltonian)), count))
+        states = list(islice(random_states(system), count))
         adjoints = [
             [
                 _adjoint(body, motor)
@@ -107,10 +109,10 @@ def conserved(hamiltonian: Hamiltonian, system: System | None = None) -> tuple[C
             ]
             for s in states
         ]
-        found += _spatial_momenta(hamiltonian, states, adjoints)
+        found += _spatial_momenta(system, states, adjoints)
         for k in range(len(hamiltonian.bodies)):
-            found += _own_momenta(hamiltonian, states, k)
-            found += _casimirs(hamiltonian, states, k)
+            found += _own_momenta(system, states, k)
+            found += _casimirs(system, states, k)
     return tuple(found)
 
 
@@ -123,8 +125,9 @@ def _energy(hamiltonian: Hamiltonian) -> Conserved:
 
 
 def _spatial_momenta(
-    hamiltonian: Hamiltonian, states: Sequence[State], adjoints: Sequence[Sequence[Matrix]]
+    system: System, states: Sequence[State], adjoints: Sequence[Sequence[Matrix]]
 ) -> list[Conserved]:
+    hamiltonian = system.hamiltonian
     called = Generators.of(hamiltonian.bodies[0])
     units = dict(zip(called.names, hamiltonian.group.momentum_units, strict=True))
     quantities = []
@@ -141,7 +144,7 @@ def _spatial_momenta(
                 kind="spatial_momentum",
                 proved=not any(map(any, hamiltonian.applied))
                 and _vanishes(
-                    hamiltonian,
+                    system,
                     [
                         (x, forque[i])
                         for forque in hamiltonian.spatial_forques
@@ -154,7 +157,8 @@ def _spatial_momenta(
     return quantities
 
 
-def _own_momenta(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> list[Conserved]:
+def _own_momenta(system: System, states: Sequence[State], k: int) -> list[Conserved]:
+    hamiltonian = system.hamiltonian
     body = hamiltonian.bodies[k]
     called = Generators.of(body)
     units = dict(zip(called.names, body.group.momentum_units, strict=True))
@@ -172,7 +176,7 @@ def _own_momenta(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> l
                 unit=units[terms[0][0]],
                 description=description,
                 kind="own",
-                proved=_vanishes(hamiltonian, list(zip(element, rates, strict=True))),
+                proved=_vanishes(system, list(zip(element, rates, strict=True))),
                 body=body.body,
                 expression=sympy.Add(
                     *(_exact(x) * p for x, p in zip(element, body.momenta, strict=True))
@@ -182,7 +186,8 @@ def _own_momenta(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> l
     return quantities
 
 
-def _casimirs(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> list[Conserved]:
+def _casimirs(system: System, states: Sequence[State], k: int) -> list[Conserved]:
+    hamiltonian = system.hamiltonian
     body = hamiltonian.bodies[k]
     momenta = {g.momentum: p for g, p in zip(body.group.generators, body.momenta, strict=True)}
     names = {p: f"mu{k}.{name}" for name, p in momenta.items()}
@@ -203,7 +208,7 @@ def _casimirs(hamiltonian: Hamiltonian, states: Sequence[State], k: int) -> list
                     unit=casimir.unit,
                     description=f"{casimir.formula} of {body.body}",
                     kind="own",
-                    proved=_vanishes(hamiltonian, list(zip(slopes, forques, strict=True))),
+                    proved=_vanishes(system, list(zip(slopes, forques, strict=True))),
                     body=body.body,
                     expression=expression,
                 )
@@ -220,14 +225,14 @@ def _polynomial(polynomial: Polynomial, symbols: Mapping[str, Expr]) -> Expr:
     )
 
 
-def _vanishes(hamiltonian: Hamiltonian, terms: Sequence[tuple[Any, Expr]]) -> bool:
+def _vanishes(system: System, terms: Sequence[tuple[Any, Expr]]) -> bool:
     """Whether Σ coefficient · expression expands to zero, variables taken as independent."""
     total = sympy.Add(*(_exact(x) * expression for x, expression in terms if x and expression))
     if total == 0:
         return True
     if _most_terms(total) > MOST_TERMS_PROVED:
         return False
-    total = sympy.expand(total.subs(dict(hamiltonian.parameters)))
+    total = sympy.expand(total.subs(system.values))
     if total == 0:
         return True
     numerator = sympy.numer(sympy.together(total))

@@ -68,13 +68,17 @@ class System:
     def _name(symbol: Expr, body: Coordinates, k: int) -> str:
         return f"{symbol.name.removeprefix(body.prefix)}_{k}"
 
+    @cached_property
+    def values(self) -> dict[Expr, Expr]:
+        """The parameters that are numbers."""
+        return {s: x for s, x in self.hamiltonian.parameters.items() if s not in self.drawn}
+
     def _program(
         self, outputs: Mapping[str, Expr], between: list[Definition] | None = None
     ) -> Program:
-        values = {s: x for s, x in self.hamiltonian.parameters.items() if s not in self.drawn}
-        known = {name: folded(x, values) for name, x in outputs.items()}
+        known = {name: folded(x, self.values) for name, x in outputs.items()}
         stages = [*self.places, *(between or [])]
-        definitions = [(s, name, folded(x, values)) for s, name, x in stages]
+        definitions = [(s, name, folded(x, self.values)) for s, name, x in stages]
         return straight_line(known, self.names, definitions)
 
     def of(self, outputs: Mapping[str, Expr], between: Sequence[Definition] = ()) -> Program:

@@ -21,6 +21,7 @@ from hamotor.mechanics.straightline import straight_line
 from hamotor.mechanics.system import System
 from hamotor.scene.conserved import ConservedQuantity
 from hamotor.scene.general import GeneralScene
+from hamotor.scene.invariants import invariants
 from hamotor.scene.methods import IN_COORDINATES, SERIES
 from hamotor.scene.model import Scene
 from hamotor.scene.scalars import Scalar
@@ -83,9 +84,9 @@ def general_source(
 
     ValueError if its programs are not those of its Hamiltonian: a defect of ours.
     """
-    invariants = conserved_by(whole)
     scene = whole if isinstance(whole, GeneralScene) else whole.general
     system = System(scene.hamiltonian, scene.drawn) if drawn else scene.system
+    kept = invariants(scene, system) if drawn else conserved_by(whole)
     first = scene.bodies[0].coordinates
     by_name = kernels != "generated"
     group_type = f"hamotor::{scene.algebra}::{scene.group.name}"
@@ -109,7 +110,7 @@ def general_source(
             ", ".join(cpp.number_text(Fraction(int(x.p), int(x.q))) for x in b.coordinates.origin)
             for b in scene.bodies
         ]
-    own = [(q, x) for q, x in invariants if x is not None and not has_column(scene, q.name)]
+    own = [(q, x) for q, x in kept if x is not None and not has_column(scene, q.name)]
     if drawn:
         _refuse_drawn(scene, method, [x for _, x in own])
     return rendered(
@@ -150,7 +151,7 @@ def general_source(
         scales=len(names) > first.dimension,
         quantities=_quantities(system, [x for _, x in own]),
         events=events_text(scene),
-        conserved=[conserved_entry(scene, q, own) for q, _ in invariants],
+        conserved=[conserved_entry(scene, q, own) for q, _ in kept],
     )
 
 

@@ -10,11 +10,17 @@ from hamotor.scene.conserved import ConservedQuantity
 if TYPE_CHECKING:
     from hamotor.mechanics.evaluation import Values
     from hamotor.mechanics.hamiltonian import Hamiltonian
+    from hamotor.mechanics.system import System
     from hamotor.scene.general import GeneralBody, GeneralScene
 
 
-def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]:
-    """Each conserved quantity; and what it is over the momenta, if the scene computes it."""
+def invariants(
+    scene: GeneralScene, system: System | None = None
+) -> tuple[tuple[ConservedQuantity, Any], ...]:
+    """Each conserved quantity; and what it is over the momenta, if the scene computes it.
+
+    system: the scene's programs; where it leaves parameters open, what any of their values keeps.
+    """
     from hamotor.mechanics.symmetries import Conserved, conserved
 
     if scene.lagrangian is not None:
@@ -47,7 +53,7 @@ def invariants(scene: GeneralScene) -> tuple[tuple[ConservedQuantity, Any], ...]
             ),
             quantity.expression if quantity.kind == "own" else None,
         )
-        for quantity in conserved(scene.hamiltonian, scene.system)
+        for quantity in conserved(scene.hamiltonian, system or scene.system)
         if quantity.kind != "own" or _has_a_value(quantity.expression, start)
     )
 
