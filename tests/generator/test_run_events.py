@@ -134,7 +134,7 @@ def test_no_way_to_the_end_is_an_error_whatever_is_recorded(
     stone: hamotor.Simulation,
     ensemble: bool,
     records: dict[str, Any],
-    span: dict[str, float],
+    span: dict[str, Any],
     problem: str,
 ) -> None:
     recorded = replace(stone, **records)

@@ -14,6 +14,7 @@ from functools import cached_property
 from itertools import combinations, pairwise
 from math import prod
 
+from hamotor.codegen import polynomial as poly
 from hamotor.codegen.algebra import Algebra, Blade, Multivector
 from hamotor.codegen.element import Element
 from hamotor.codegen.polynomial import Polynomial
@@ -197,10 +198,8 @@ def _images(
     known: dict[frozenset[tuple[tuple[str, ...], object]], Signed] = {}
     for name, p in polynomials.items():
         for sign in (1, -1) if p else ():
-            if known.setdefault(frozenset((m, sign * x) for m, x in p.items()), (sign, name)) != (
-                sign,
-                name,
-            ):
+            signed = sign, name
+            if known.setdefault(frozenset(poly.scaled(p, sign).items()), signed) != signed:
                 raise _Fails
     images: dict[str, Signed] = {}
     for name, p in polynomials.items():
@@ -322,6 +321,8 @@ def _as_three_sums(x: Expression, turn: Turn) -> Expression:
         terms.append(start)
         start = None
     left = {_key(term): term for term in reversed(terms)}
+    if len(left) < len(terms):
+        return x
     first: list[Product] = []
     alone: list[Product] = []
     while left:
