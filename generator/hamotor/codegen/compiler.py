@@ -255,7 +255,8 @@ def _kernels_file(
     needed = {n.function for k in kernels for n in k.program.nodes() if isinstance(n, Call)}
     found = {RUNTIME_HEADERS[f]: None for f in sorted(needed) if f in RUNTIME_HEADERS}
     data = [kernel_data(k) for k in kernels]
-    packed = ["hamotor/lanes.hpp"] if any(lanes.packed_body(k) for k in kernels) else []
+    in_lanes = any(lanes.PACKED in line for k in data for line in k["body"])
+    packed = ["hamotor/lanes.hpp"] if in_lanes else []
     includes = [*includes, *found, *packed]
     text = render(
         template,

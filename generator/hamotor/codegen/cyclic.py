@@ -81,9 +81,13 @@ def cyclic_program(algebra: Algebra, program: Program) -> tuple[Program, Turn] |
     """
     for permutation in _permutations(algebra):
         try:
-            return _turned(algebra, permutation, program)
+            names = _parameter_images(algebra, permutation, program)
         except _Fails:
             continue
+        try:
+            return _turned(algebra, permutation, program, names)
+        except _Fails:
+            return None  # all others would fail for the same reason, each after as long
     return None
 
 
@@ -101,13 +105,10 @@ def _permutations(algebra: Algebra) -> Iterator[Sequence[int]]:
             yield image
 
 
-def _turned(algebra: Algebra, permutation: Sequence[int], program: Program) -> tuple[Program, Turn]:
-    names: dict[str, Signed] = {}
-    for parameter in program.parameters:
-        images = _component_images(algebra, permutation, parameter.element)
-        for name, (sign, image) in images.items():
-            names[f"{parameter.name}.{name}"] = sign, f"{parameter.name}.{image}"
-    names |= _binding_images(program, names)
+def _turned(
+    algebra: Algebra, permutation: Sequence[int], program: Program, components: Mapping[str, Signed]
+) -> tuple[Program, Turn]:
+    names = _binding_images(program, components)
     outputs = _images({n: _polynomial(x) for n, x in program.outputs}, names)
     if any(sign < 0 for sign, _ in outputs.values()):
         raise _Fails
@@ -148,6 +149,17 @@ def _degrees(program: Program) -> dict[str, int]:
             sum(degrees.get(factor, 1) for factor in monomial) for monomial in _polynomial(x)
         )
     return degrees
+
+
+def _parameter_images(
+    algebra: Algebra, permutation: Sequence[int], program: Program
+) -> dict[str, Signed]:
+    names: dict[str, Signed] = {}
+    for parameter in program.parameters:
+        images = _component_images(algebra, permutation, parameter.element)
+        for name, (sign, image) in images.items():
+            names[f"{parameter.name}.{name}"] = sign, f"{parameter.name}.{image}"
+    return names
 
 
 def _component_images(

@@ -32,6 +32,7 @@ from hamotor.codegen.program import (
 )
 
 WIDTH = 4
+PACKED = "lanes::packed<S>"
 INLINED_OPERATIONS = 128
 """Kernels of at most so many additions, multiplications and divisions are always inlined: for
 them the way of a result through memory costs more than the arithmetic."""
@@ -46,10 +47,10 @@ def in_threes(algebra: Algebra, kernel: Kernel) -> Kernel:
     cost = kernel.program.cost
     if kernel.meaning is None or cost.calls or cost.total < THREES_OPERATIONS:
         return kernel
-    if _fours(kernel.program) is not None:
-        return kernel
     found = cyclic_program(algebra, kernel.program)
-    return kernel if found is None else proved(replace(kernel, program=found[0], turn=found[1]))
+    if found is None or _fours(kernel.program) is not None:
+        return kernel
+    return proved(replace(kernel, program=found[0], turn=found[1]))
 
 
 def packed_body(kernel: Kernel) -> list[str]:
@@ -57,7 +58,7 @@ def packed_body(kernel: Kernel) -> list[str]:
     if kernel.shortcut is not None:
         return []
     packed = _fours(kernel.program)
-    where = "lanes::packed<S>"
+    where = PACKED
     if kernel.turn is not None:
         packed = threes_lines(kernel.program, kernel.turn)
         if kernel.program.cost.total <= INLINED_OPERATIONS:
