@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from hamotor.codegen import bundled_algebras, read_algebra
 from hamotor.codegen.algebra import Algebra
+from hamotor.codegen.compiler import compile_algebra
 from hamotor.codegen.cyclic import cyclic_program
 from hamotor.codegen.kernel import Kernel
 from hamotor.codegen.lanes import THREES_OPERATIONS, packed_body
@@ -15,6 +18,7 @@ from hamotor.codegen.library import library
 from hamotor.codegen.program import Name, one_level, walk
 from hamotor.codegen.spec import bundled_path, parse_algebra
 
+ROOT = Path(__file__).resolve().parents[2]
 SPECS = {name: read_algebra(bundled_path(name)) for name in bundled_algebras()}
 IN_THREES = [
     (name, kernel) for name, spec in SPECS.items() for kernel in library(spec) if kernel.turn
@@ -118,3 +122,65 @@ gp = ["Even Even"]
     gram = tuple(tuple(int(i == k) for k in range(3)) for i in range(3))
     euclidean = Algebra("foo", spec.algebra.basis, gram)
     assert cyclic_program(euclidean, library(SPECS["cl3"])[0].program) is not None
+
+
+SCALAR = """
+name = "foo"
+description = "A number that is a product of three."
+basis = ["e1", "e2", "e3", "e4"]
+gram = { diagonal = [1, 1, 1, 1] }
+
+[element.Scalar]
+doc = "A number."
+symbol = "s"
+blades = ["s"]
+
+[element.Even]
+doc = "Even."
+symbol = "a"
+blades = ["s", "e12", "e13", "e14", "e23", "e24", "e34", "e1234"]
+
+[kernels]
+gp = ["Even Even Even -> Scalar"]
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_lanes_compile_for_a_number_and_with_symbols_like_steps(
+    tmp_path: Path, compiler: str
+) -> None:
+    (kernel,) = library(parse_algebra(SCALAR, "foo.toml"))
+    assert kernel.turn is not None
+    assert packed_body(kernel)[-3].startswith("return dot(")
+    text = bundled_path("pga3").read_text("utf-8")
+    pga3 = text.replace('symbol = "m"', 'symbol = "c"')
+    assert pga3.count('symbol = "c"') == 1
+    for name, spec_text in (("foo", SCALAR), ("pga3", pga3)):
+        spec = parse_algebra(spec_text, f"{name}.toml")
+        for file in compile_algebra(spec):
+            path = tmp_path / file.path
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(file.text, encoding="utf-8")
+    source = tmp_path / "both.cpp"
+    source.write_text(BOTH, encoding="utf-8")
+    runtime = ROOT / "runtime" / "include"
+    flags = ("-std=c++20", "-mavx2", "-mfma", "-Wall", "-Wextra", "-Werror", "-fsyntax-only")
+    done = subprocess.run(
+        [compiler, *flags, "-I", tmp_path, "-I", runtime, source],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+BOTH = """
+#include "hamotor/foo/foo.hpp"
+#include "hamotor/pga3/pga3.hpp"
+
+double number(const hamotor::foo::Even<double>& a) { return gp(a, a, a); }
+auto line(const hamotor::pga3::Motor<double>& m, const hamotor::pga3::Bivector<double>& b) {
+  return sandwich(m, b);
+}
+"""

@@ -473,42 +473,42 @@ template <class S>
       const S a_plus_s = a.s - a.e0i;
       const auto three_a_e023i = four(a.e023i, a.e031i, a.e012i, a.e023i);
       const auto three_a_e23 = four(a.e23, a.e31, a.e12, a.e23);
-      const auto three_a_plus_e12 =
+      const auto a_plus_e12_three =
           turned<3, 1, 2, 3>(three_a_e23) - turned<3, 1, 2, 3>(three_a_e023i);
       const auto three_a_e01 = four(a.e01, a.e02, a.e03, a.e01);
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_plus_e1 =
+      const auto plus_e1_three =
           dot(three_a_e01, four(v.ei), four(S(0.5)),
-              dot(four(a_plus_s), three_v_e1, three_a_plus_e12, turned<2, 3, 4, 2>(three_v_e1),
-                  -turned<3, 1, 2, 3>(three_a_plus_e12), turned<3, 1, 2, 3>(three_v_e1)));
-      const auto three_a_minus_e12 =
+              dot(four(a_plus_s), three_v_e1, a_plus_e12_three, turned<2, 3, 4, 2>(three_v_e1),
+                  -turned<3, 1, 2, 3>(a_plus_e12_three), turned<3, 1, 2, 3>(three_v_e1)));
+      const auto a_minus_e12_three =
           turned<3, 1, 2, 3>(three_a_e23) + turned<3, 1, 2, 3>(three_a_e023i);
       const S a_minus_s = a.s + a.e0i;
       const auto three_a_e1i = four(a.e1i, a.e2i, a.e3i, a.e1i);
-      const auto three_minus_e1 =
+      const auto minus_e1_three =
           dot(-three_a_e1i, four(v.e0), four(S(0.5)),
-              dot(four(a_minus_s), three_v_e1, three_a_minus_e12, turned<2, 3, 4, 2>(three_v_e1),
-                  -turned<3, 1, 2, 3>(three_a_minus_e12), turned<3, 1, 2, 3>(three_v_e1)));
-      const S a_plus_e23 = three_a_plus_e12[1];
-      const S a_plus_e31 = three_a_plus_e12[2];
-      const S a_plus_e12 = three_a_plus_e12[0];
+              dot(four(a_minus_s), three_v_e1, a_minus_e12_three, turned<2, 3, 4, 2>(three_v_e1),
+                  -turned<3, 1, 2, 3>(a_minus_e12_three), turned<3, 1, 2, 3>(three_v_e1)));
+      const S a_plus_e23 = a_plus_e12_three[1];
+      const S a_plus_e31 = a_plus_e12_three[2];
+      const S a_plus_e12 = a_plus_e12_three[0];
       const S plus_e123 =
           dot(a.e0123, v.ei, S(0.5), dot(a_plus_e12, v.e3, a_plus_e31, v.e2, a_plus_e23, v.e1));
-      const S a_minus_e23 = three_a_minus_e12[1];
-      const S a_minus_e31 = three_a_minus_e12[2];
-      const S a_minus_e12 = three_a_minus_e12[0];
+      const S a_minus_e23 = a_minus_e12_three[1];
+      const S a_minus_e31 = a_minus_e12_three[2];
+      const S a_minus_e12 = a_minus_e12_three[0];
       const S minus_e123 =
           dot(-a.e123i, v.e0, S(0.5), dot(a_minus_e12, v.e3, a_minus_e31, v.e2, a_minus_e23, v.e1));
-      const auto all_e1 = three_plus_e1 + three_minus_e1;
+      const auto all_e1 = plus_e1_three + minus_e1_three;
       const auto all_e023 =
           dot(turned<2, 3, 4, 2>(three_a_e01), turned<3, 1, 2, 3>(three_v_e1),
               -turned<3, 1, 2, 3>(three_a_e01), turned<2, 3, 4, 2>(three_v_e1), four(a.e0123),
-              three_v_e1, turned<2, 3, 4, 2>(three_a_plus_e12), four(v.e0));
-      const auto all_e01i = three_plus_e1 - three_minus_e1;
+              three_v_e1, turned<2, 3, 4, 2>(a_plus_e12_three), four(v.e0));
+      const auto all_e01i = plus_e1_three - minus_e1_three;
       const auto all_e23i =
           dot(-turned<2, 3, 4, 2>(three_a_e1i), turned<3, 1, 2, 3>(three_v_e1),
               turned<3, 1, 2, 3>(three_a_e1i), turned<2, 3, 4, 2>(three_v_e1), -four(a.e123i),
-              three_v_e1, turned<2, 3, 4, 2>(three_a_minus_e12), four(v.ei));
+              three_v_e1, turned<2, 3, 4, 2>(a_minus_e12_three), four(v.ei));
       return {.e0 = dot(a.e01, v.e1, a.e02, v.e2, a.e03, v.e3, a_plus_s, v.e0),
               .e1 = all_e1[0],
               .e2 = all_e1[1],
@@ -765,57 +765,57 @@ template <class S>
       using lanes::turned;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) - turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s - m.e0i;
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S m_plus_e31 = three_m_plus_e12[2];
-      const S m_plus_e12 = three_m_plus_e12[0];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S m_plus_e31 = m_plus_e12_three[2];
+      const S m_plus_e12 = m_plus_e12_three[0];
       const S plus_s =
           dot(-b.e1i, m.e01, -b.e2i, m.e02, -b.e3i, m.e03, S(0.5),
               dot(-b.e0i, m_plus_s, -b.e12, m_plus_e12, -b.e31, m_plus_e31, -b.e23, m_plus_e23));
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s + m.e0i;
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S m_minus_e12 = three_m_minus_e12[0];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S m_minus_e12 = m_minus_e12_three[0];
       const S minus_s =
           dot(-b.e01, m.e1i, -b.e02, m.e2i, -b.e03, m.e3i, S(0.5),
               dot(b.e0i, m_minus_s, -b.e12, m_minus_e12, -b.e31, m_minus_e31, -b.e23, m_minus_e23));
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
-      const auto three_plus_e23 =
+      const auto plus_e23_three =
           dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e01),
               turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e01), -three_b_e1i,
               four(m.e0123), four(S(0.5)),
-              dot(three_b_e23, four(m_plus_s), turned<2, 3, 4, 2>(three_b_e23), three_m_plus_e12,
-                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_m_plus_e12),
-                  -four(b.e0i), turned<2, 3, 4, 2>(three_m_plus_e12)));
+              dot(three_b_e23, four(m_plus_s), turned<2, 3, 4, 2>(three_b_e23), m_plus_e12_three,
+                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(m_plus_e12_three),
+                  -four(b.e0i), turned<2, 3, 4, 2>(m_plus_e12_three)));
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_minus_e23 =
+      const auto minus_e23_three =
           dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e1i),
               turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e1i), -three_b_e01,
               four(m.e123i), four(S(0.5)),
-              dot(three_b_e23, four(m_minus_s), turned<2, 3, 4, 2>(three_b_e23), three_m_minus_e12,
-                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(three_m_minus_e12),
-                  four(b.e0i), turned<2, 3, 4, 2>(three_m_minus_e12)));
-      const auto all_e23 = three_plus_e23 + three_minus_e23;
+              dot(three_b_e23, four(m_minus_s), turned<2, 3, 4, 2>(three_b_e23), m_minus_e12_three,
+                  -turned<3, 1, 2, 3>(three_b_e23), turned<3, 1, 2, 3>(m_minus_e12_three),
+                  four(b.e0i), turned<2, 3, 4, 2>(m_minus_e12_three)));
+      const auto all_e23 = plus_e23_three + minus_e23_three;
       const auto all_e1i =
           dot(-four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e1i), -three_b_e23, four(m.e123i), three_b_e1i,
-              four(m_minus_s), turned<2, 3, 4, 2>(three_b_e1i), three_m_minus_e12,
-              -turned<3, 1, 2, 3>(three_b_e1i), turned<3, 1, 2, 3>(three_m_minus_e12));
-      const auto all_e023i = -three_plus_e23 + three_minus_e23;
+              four(m_minus_s), turned<2, 3, 4, 2>(three_b_e1i), m_minus_e12_three,
+              -turned<3, 1, 2, 3>(three_b_e1i), turned<3, 1, 2, 3>(m_minus_e12_three));
+      const auto all_e023i = -plus_e23_three + minus_e23_three;
       const auto all_e01 =
           dot(four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e01), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e01), -three_b_e23, four(m.e0123), three_b_e01,
-              four(m_plus_s), turned<2, 3, 4, 2>(three_b_e01), three_m_plus_e12,
-              -turned<3, 1, 2, 3>(three_b_e01), turned<3, 1, 2, 3>(three_m_plus_e12));
+              four(m_plus_s), turned<2, 3, 4, 2>(three_b_e01), m_plus_e12_three,
+              -turned<3, 1, 2, 3>(three_b_e01), turned<3, 1, 2, 3>(m_plus_e12_three));
       return {
           .s = plus_s + minus_s,
           .e23 = all_e23[0],
@@ -826,7 +826,7 @@ template <class S>
           .e3i = all_e1i[2],
           .e123i = mul_add(-b.e0i, m.e123i,
                            lanes::total(dot(three_b_e23, three_m_e1i,
-                                            turned<3, 1, 2, 3>(three_b_e1i), three_m_minus_e12))),
+                                            turned<3, 1, 2, 3>(three_b_e1i), m_minus_e12_three))),
           .e0i = -plus_s + minus_s,
           .e023i = all_e023i[0],
           .e031i = all_e023i[1],
@@ -836,7 +836,7 @@ template <class S>
           .e03 = all_e01[2],
           .e0123 = mul_add(b.e0i, m.e0123,
                            lanes::total(dot(three_b_e23, three_m_e01,
-                                            turned<3, 1, 2, 3>(three_b_e01), three_m_plus_e12)))};
+                                            turned<3, 1, 2, 3>(three_b_e01), m_plus_e12_three)))};
     }
   }
   const S m_plus_e12 = m.e12 - m.e012i;
@@ -1272,45 +1272,45 @@ template <class S>
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+      const auto c_e1_three = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
                                   turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
                                   -three_m_e1i, four(v.e0), three_m_e01, four(v.ei));
       const S c_e0 = dot(-m.e0i, v.e0, m.e01, v.e1, m.e02, v.e2, m.e03, v.e3);
       const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
-      const auto three_c_e012 = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
+      const auto c_e012_three = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
                                     turned<3, 1, 2, 3>(three_v_e1));
       const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
-      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+      const auto c_e12i_three = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
                                     turned<3, 1, 2, 3>(three_v_e1));
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
-      const S c_e03i = three_c_e01i[2];
-      const S c_e02i = three_c_e01i[1];
-      const S c_e01i = three_c_e01i[0];
-      const S c_e023 = three_c_e012[1];
-      const S c_e031 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
+      const S c_e03i = c_e01i_three[2];
+      const S c_e02i = c_e01i_three[1];
+      const S c_e01i = c_e01i_three[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
       const auto all_e1 = mul_add(
           four(S(2)),
-          dot(three_c_e01i, four(m.e0i), turned<2, 3, 4, 2>(three_c_e01i),
-              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e01i),
-              turned<2, 3, 4, 2>(three_m_e023i), four(c_e123), three_m_e23, -three_c_e012,
-              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
-              three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(three_c_e12i),
-              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123),
-              three_c_e1, four(m.s), turned<2, 3, 4, 2>(three_c_e1),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1),
+          dot(c_e01i_three, four(m.e0i), turned<2, 3, 4, 2>(c_e01i_three),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(c_e01i_three),
+              turned<2, 3, 4, 2>(three_m_e023i), four(c_e123), three_m_e23, -c_e012_three,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(c_e012_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(c_e012_three), four(m.e123i),
+              c_e12i_three, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(c_e12i_three),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(c_e12i_three), four(m.e0123),
+              c_e1_three, four(m.s), turned<2, 3, 4, 2>(c_e1_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e1_three),
               turned<2, 3, 4, 2>(three_m_e23), -four(c_e0), three_m_e1i, four(c_ei), three_m_e01),
           three_v_e1);
-      const S c_e23i = three_c_e12i[1];
-      const S c_e31i = three_c_e12i[2];
-      const S c_e12i = three_c_e12i[0];
+      const S c_e23i = c_e12i_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S c_e12i = c_e12i_three[0];
       return {.e0 = mul_add(
                   S(2),
                   dot(c_e012, m.e12, -c_e012, m.e012i, c_e031, m.e31, -c_e031, m.e031i, c_e023,
@@ -1390,7 +1390,7 @@ template <class S>
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
               four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
@@ -1398,14 +1398,14 @@ template <class S>
               turned<3, 1, 2, 3>(three_m_e1i));
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
-      const auto three_c_e01 =
+      const auto c_e01_three =
           dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e23), -three_b_e01,
               four(m.e0i), four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e01), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e01));
       const S c_e0i = lanes::total(dot(-three_b_e01, three_m_e1i, three_b_e1i, three_m_e01));
-      const auto three_c_e12 =
+      const auto c_e12_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
               three_b_e01, turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_b_e1i),
@@ -1413,60 +1413,60 @@ template <class S>
       const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
       const S c_e0123 = dot(-b.e01, m.e023i, -b.e02, m.e031i, -b.e03, m.e012i, b.e0i, m.e0123);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i),
               turned<3, 1, 2, 3>(three_b_e1i), four(m.e0123));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
-      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
-      const auto three_m_minus_e12 =
+      const auto c_minus_e12_three = c_e012i_three + c_e12_three;
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s - m.e0i;
-      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const auto c_plus_e12_three = -c_e012i_three + c_e12_three;
       const auto all_e23 = mul_add(
           four(S(2)),
-          dot(three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
-              four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, -three_c_e12,
-              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e12), four(m.s),
-              four(c_e0i), three_m_e023i, -three_c_e01, four(m.e123i),
-              turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), -three_c_e1i,
-              four(m.e0123), turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
-              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01)),
+          dot(c_e012i_three, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(c_e012i_three), four(m.e0i),
+              four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, -c_e12_three,
+              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(c_e12_three), four(m.s),
+              four(c_e0i), three_m_e023i, -c_e01_three, four(m.e123i),
+              turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e1i),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e1i), -c_e1i_three,
+              four(m.e0123), turned<2, 3, 4, 2>(c_e1i_three), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<3, 1, 2, 3>(c_e1i_three), turned<2, 3, 4, 2>(three_m_e01)),
           three_b_e23);
       const auto all_e1i =
           mul_add(four(S(2)),
-                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), -four(c_e0i), three_m_e1i, three_c_e1i,
-                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(-c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), -four(c_e0i), three_m_e1i, c_e1i_three,
+                      four(m_plus_s), turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      -turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_b_e1i);
-      const S c_e3i = three_c_e1i[2];
-      const S c_e2i = three_c_e1i[1];
-      const S c_e1i = three_c_e1i[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
-      const S c_e23 = three_c_e12[1];
-      const S c_e31 = three_c_e12[2];
-      const S c_e12 = three_c_e12[0];
-      const S c_e023i = three_c_e012i[1];
-      const S c_e031i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
+      const S c_e3i = c_e1i_three[2];
+      const S c_e2i = c_e1i_three[1];
+      const S c_e1i = c_e1i_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
+      const S c_e23 = c_e12_three[1];
+      const S c_e31 = c_e12_three[2];
+      const S c_e12 = c_e12_three[0];
+      const S c_e023i = c_e012i_three[1];
+      const S c_e031i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
       const auto all_e01 =
           mul_add(four(S(2)),
-                  dot(-three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
-                      turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
-                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), -four(c_e0123),
-                      turned<2, 3, 4, 2>(three_m_minus_e12), four(c_e0i), three_m_e01, three_c_e01,
-                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
-                      turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  dot(-c_plus_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+                      turned<3, 1, 2, 3>(c_plus_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+                      -turned<2, 3, 4, 2>(c_plus_e12_three), four(m.e0123), -four(c_e0123),
+                      turned<2, 3, 4, 2>(m_minus_e12_three), four(c_e0i), three_m_e01, c_e01_three,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(c_e01_three), m_minus_e12_three,
+                      turned<3, 1, 2, 3>(c_e01_three), turned<3, 1, 2, 3>(m_minus_e12_three)),
                   three_b_e01);
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
@@ -1594,82 +1594,82 @@ template <class S>
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
       const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
-      const auto three_c_e012 =
+      const auto c_e012_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e023), turned<2, 3, 4, 2>(three_m_e23),
               three_t_e023, -four(m.e0i), turned<3, 1, 2, 3>(three_t_e023), -three_m_e01,
               turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e01), three_t_e01i,
               turned<3, 1, 2, 3>(three_m_e01), four(t.e123));
       const S m_minus_s = m.s - m.e0i;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
       const S c_e123 = lanes::total(dot(-three_m_e1i, three_t_e023, three_m_e01, three_t_e23i));
       const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
-      const auto three_c_e1 =
+      const auto c_e1_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_t_e01i),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_t_e01i), four(m.e123i),
               three_t_e023, -four(m.e0123), three_t_e23i);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_t_e01i),
               turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_t_e01i),
               -turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_t_e023),
               turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_t_e023),
               -turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_t_e23i),
               turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_t_e23i));
-      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
-      const auto three_c_e12i =
+      const auto c_plus_e1_three = c_e1_three + c_e01i_three;
+      const auto c_e12i_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e23i), turned<2, 3, 4, 2>(three_m_e23),
               three_t_e23i, four(m.e0i), turned<3, 1, 2, 3>(three_t_e23i), -three_m_e1i,
               turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e1i), three_t_e01i,
               -turned<3, 1, 2, 3>(three_m_e1i), four(t.e123));
       const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
       const S m_plus_s = m.s + m.e0i;
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto c_minus_e1_three = c_e1_three - c_e01i_three;
       const auto all_e023 = mul_add(
           four(S(2)),
-          dot(-three_c_plus_e1, four(m.e0123), turned<2, 3, 4, 2>(three_c_plus_e1),
-              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(three_c_plus_e1),
-              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
-              four(c_e123), three_m_e01, three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
-              -turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
-              turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          dot(-c_plus_e1_three, four(m.e0123), turned<2, 3, 4, 2>(c_plus_e1_three),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(c_plus_e1_three),
+              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(m_minus_e12_three),
+              four(c_e123), three_m_e01, c_e012_three, turned<3, 1, 2, 3>(m_minus_e12_three),
+              -turned<3, 1, 2, 3>(c_e012_three), m_minus_e12_three,
+              turned<2, 3, 4, 2>(c_e012_three), four(m_minus_s)),
           three_t_e023);
-      const S c_e23i = three_c_e12i[1];
-      const S c_e31i = three_c_e12i[2];
-      const S c_e12i = three_c_e12i[0];
-      const S c_e023 = three_c_e012[1];
-      const S c_e031 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
-      const S c_e03i = three_c_e01i[2];
-      const S c_e02i = three_c_e01i[1];
-      const S c_e01i = three_c_e01i[0];
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
+      const S c_e23i = c_e12i_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S c_e12i = c_e12i_three[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S c_e03i = c_e01i_three[2];
+      const S c_e02i = c_e01i_three[1];
+      const S c_e01i = c_e01i_three[0];
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
       const auto all_e01i = mul_add(
           four(S(2)),
-          dot(three_c_e1, four(m.e0i), turned<2, 3, 4, 2>(three_c_e1),
-              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e1),
+          dot(c_e1_three, four(m.e0i), turned<2, 3, 4, 2>(c_e1_three),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(c_e1_three),
               turned<2, 3, 4, 2>(three_m_e023i), -four(c_e0), three_m_e1i, -four(c_ei), three_m_e01,
-              three_c_e01i, four(m.s), turned<2, 3, 4, 2>(three_c_e01i),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01i),
-              turned<2, 3, 4, 2>(three_m_e23), four(c_e123), three_m_e023i, -three_c_e012,
-              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
-              -three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_c_e12i),
-              turned<3, 1, 2, 3>(three_m_e01), -turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123)),
+              c_e01i_three, four(m.s), turned<2, 3, 4, 2>(c_e01i_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e01i_three),
+              turned<2, 3, 4, 2>(three_m_e23), four(c_e123), three_m_e023i, -c_e012_three,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(c_e012_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(c_e012_three), four(m.e123i),
+              -c_e12i_three, turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(c_e12i_three),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<2, 3, 4, 2>(c_e12i_three), four(m.e0123)),
           three_t_e01i);
       const auto all_e23i = mul_add(
           four(S(2)),
-          dot(three_c_minus_e1, four(m.e123i), -turned<2, 3, 4, 2>(three_c_minus_e1),
-              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e1),
-              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(three_m_plus_e12),
-              -four(c_e123), three_m_e1i, -three_c_e12i, turned<3, 1, 2, 3>(three_m_plus_e12),
-              turned<3, 1, 2, 3>(three_c_e12i), three_m_plus_e12, turned<2, 3, 4, 2>(three_c_e12i),
+          dot(c_minus_e1_three, four(m.e123i), -turned<2, 3, 4, 2>(c_minus_e1_three),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(c_minus_e1_three),
+              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(m_plus_e12_three),
+              -four(c_e123), three_m_e1i, -c_e12i_three, turned<3, 1, 2, 3>(m_plus_e12_three),
+              turned<3, 1, 2, 3>(c_e12i_three), m_plus_e12_three, turned<2, 3, 4, 2>(c_e12i_three),
               four(m_plus_s)),
           three_t_e23i);
       return {.e023 = all_e023[0],
@@ -1800,43 +1800,43 @@ template <class S>
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_q_e023i = four(q.e023i, q.e031i, q.e012i, q.e023i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_q_e023i), turned<2, 3, 4, 2>(three_m_e23),
               three_q_e023i, -turned<3, 1, 2, 3>(three_m_e1i), four(q.e0123),
               turned<3, 1, 2, 3>(three_m_e01), four(q.e123i));
       const S c_e0123 = dot(-m.e0i, q.e0123, m.e01, q.e023i, m.e02, q.e031i, m.e03, q.e012i);
       const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e12 = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
+      const auto c_e12_three = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
                                    turned<2, 3, 4, 2>(three_m_e023i), three_q_e023i);
-      const auto three_c_e01 = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
+      const auto c_e01_three = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
       const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
-      const auto three_c_e1i = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
-      const S c_e023i = three_c_e012i[1];
-      const S c_e031i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
-      const S c_e23 = three_c_e12[1];
-      const S c_e31 = three_c_e12[2];
-      const S c_e12 = three_c_e12[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
+      const auto c_e1i_three = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
+      const S c_e023i = c_e012i_three[1];
+      const S c_e031i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
+      const S c_e23 = c_e12_three[1];
+      const S c_e31 = c_e12_three[2];
+      const S c_e12 = c_e12_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
       const auto all_e023i = mul_add(
           four(S(2)),
-          dot(three_c_e12, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e12), four(m.e0i),
-              -four(c_e0i), three_m_e23, three_c_e01, four(m.e123i),
-              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
-              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), -three_c_e1i,
-              four(m.e0123), turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
-              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01), -three_c_e012i,
-              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e012i), four(m.s),
+          dot(c_e12_three, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(c_e12_three), four(m.e0i),
+              -four(c_e0i), three_m_e23, c_e01_three, four(m.e123i),
+              -turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e1i), -c_e1i_three,
+              four(m.e0123), turned<2, 3, 4, 2>(c_e1i_three), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<3, 1, 2, 3>(c_e1i_three), turned<2, 3, 4, 2>(three_m_e01), -c_e012i_three,
+              turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(c_e012i_three), four(m.s),
               -four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01),
           three_q_e023i);
-      const S c_e3i = three_c_e1i[2];
-      const S c_e2i = three_c_e1i[1];
-      const S c_e1i = three_c_e1i[0];
+      const S c_e3i = c_e1i_three[2];
+      const S c_e2i = c_e1i_three[1];
+      const S c_e1i = c_e1i_three[0];
       return {.e0123 = mul_add(S(2),
                                dot(-c_e01, m.e23, c_e01, m.e023i, -c_e02, m.e31, c_e02, m.e031i,
                                    -c_e03, m.e12, c_e03, m.e012i, -c_e12, m.e03, -c_e31, m.e02,
@@ -1912,44 +1912,44 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e012 = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
+      const auto c_e012_three = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
       const S c_e0 = m.e0i * v.e0;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+      const auto c_e1_three = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
                                   turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
                                   -three_m_e1i, four(v.e0));
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
       const S c_e123 = m.e123i * v.e0;
       const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
-      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+      const auto c_e12i_three = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
                                     turned<3, 1, 2, 3>(three_v_e1));
-      const S c_e023 = three_c_e012[1];
-      const S c_e013 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e013 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
       const auto all_e1 =
           mul_add(four(S(2)),
-                  dot(four(c_e0), three_m_e1i, three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
-                      -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
-                      turned<2, 3, 4, 2>(three_c_e012), four(m.e123i), -four(c_e123), three_m_e23,
-                      three_c_e01i, four(m.e0i), turned<2, 3, 4, 2>(three_c_e01i),
-                      turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e01i),
-                      turned<2, 3, 4, 2>(three_m_e023i), three_c_e1, four(m.s),
-                      turned<2, 3, 4, 2>(three_c_e1), turned<3, 1, 2, 3>(three_m_e23),
-                      -turned<3, 1, 2, 3>(three_c_e1), turned<2, 3, 4, 2>(three_m_e23)),
+                  dot(four(c_e0), three_m_e1i, c_e012_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(c_e012_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(c_e012_three), four(m.e123i), -four(c_e123), three_m_e23,
+                      c_e01i_three, four(m.e0i), turned<2, 3, 4, 2>(c_e01i_three),
+                      turned<3, 1, 2, 3>(three_m_e023i), -turned<3, 1, 2, 3>(c_e01i_three),
+                      turned<2, 3, 4, 2>(three_m_e023i), c_e1_three, four(m.s),
+                      turned<2, 3, 4, 2>(c_e1_three), turned<3, 1, 2, 3>(three_m_e23),
+                      -turned<3, 1, 2, 3>(c_e1_three), turned<2, 3, 4, 2>(three_m_e23)),
                   three_v_e1);
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
-      const S c_e03i = three_c_e01i[2];
-      const S c_e02i = three_c_e01i[1];
-      const S c_e01i = three_c_e01i[0];
-      const S c_e23i = three_c_e12i[1];
-      const S c_e31i = three_c_e12i[2];
-      const S c_e12i = three_c_e12i[0];
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
+      const S c_e03i = c_e01i_three[2];
+      const S c_e02i = c_e01i_three[1];
+      const S c_e01i = c_e01i_three[0];
+      const S c_e23i = c_e12i_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S c_e12i = c_e12i_three[0];
       return {.e0 = mul_add(S(2),
                             dot(-c_e0, m.s, c_e0, m.e0i, -c_e012, m.e12, c_e012, m.e012i, -c_e013,
                                 m.e31, c_e013, m.e031i, -c_e023, m.e23, c_e023, m.e023i),
@@ -2022,68 +2022,68 @@ template <class S>
       const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_c_e01 = dot(-turned<3, 1, 2, 3>(three_b_e01),
+      const auto c_e01_three = dot(-turned<3, 1, 2, 3>(three_b_e01),
                                    turned<2, 3, 4, 2>(three_m_e23), turned<2, 3, 4, 2>(three_b_e01),
                                    turned<3, 1, 2, 3>(three_m_e23), -three_b_e01, four(m.e0i));
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i));
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e12 =
+      const auto c_e12_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
               three_b_e01, turned<2, 3, 4, 2>(three_m_e1i));
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
               four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e1i));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
       const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
-      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
-      const auto three_m_minus_e12 =
+      const auto c_minus_e12_three = c_e12_three + c_e012i_three;
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s - m.e0i;
       const auto all_e23 = mul_add(
           four(S(2)),
-          dot(-three_c_e12, turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_c_e12), four(m.s),
-              three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
-              -three_c_e01, four(m.e123i), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e01),
+          dot(-c_e12_three, turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(c_e12_three), four(m.s),
+              c_e012i_three, turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(c_e012i_three), four(m.e0i),
+              -c_e01_three, four(m.e123i), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(c_e01_three),
               turned<2, 3, 4, 2>(three_m_e1i), -four(c_e0123), three_m_e1i, -four(c_e0i),
               three_m_e023i),
           three_b_e23);
       const auto all_e1i =
           mul_add(four(S(2)),
-                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e0i),
-                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(three_m_plus_e12), three_c_e1i,
-                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(-c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e0i),
+                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(m_plus_e12_three), c_e1i_three,
+                      four(m_plus_s), turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      -turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_b_e1i);
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
-      const S c_e023i = three_c_e012i[1];
-      const S c_e031i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
-      const S c_e23 = three_c_e12[1];
-      const S c_e31 = three_c_e12[2];
-      const S c_e12 = three_c_e12[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
+      const S c_e023i = c_e012i_three[1];
+      const S c_e031i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
+      const S c_e23 = c_e12_three[1];
+      const S c_e31 = c_e12_three[2];
+      const S c_e12 = c_e12_three[0];
       const auto all_e01 = mul_add(
           four(S(2)),
-          dot(three_c_e01, four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
-              turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12), four(c_e0123),
-              turned<2, 3, 4, 2>(three_m_minus_e12)),
+          dot(c_e01_three, four(m_minus_s), -turned<2, 3, 4, 2>(c_e01_three), m_minus_e12_three,
+              turned<3, 1, 2, 3>(c_e01_three), turned<3, 1, 2, 3>(m_minus_e12_three), four(c_e0123),
+              turned<2, 3, 4, 2>(m_minus_e12_three)),
           three_b_e01);
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
@@ -2216,54 +2216,54 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto twice_e1i_three = four(S(2)) * three_m_e1i;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
-      const auto three_c_e12 =
-          dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
-              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_b_e01),
-              three_twice_e1i, three_b_e01, turned<2, 3, 4, 2>(three_twice_e1i));
-      const auto three_c_e01 =
-          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23));
-      const S twice_e3i = three_twice_e1i[2];
-      const S twice_e2i = three_twice_e1i[1];
-      const S twice_e1i = three_twice_e1i[0];
+      const auto c_e12_three =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), twice_e23_three, three_b_e23,
+              turned<2, 3, 4, 2>(twice_e23_three), -turned<2, 3, 4, 2>(three_b_e01),
+              twice_e1i_three, three_b_e01, turned<2, 3, 4, 2>(twice_e1i_three));
+      const auto c_e01_three =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(twice_e23_three));
+      const S twice_e3i = twice_e1i_three[2];
+      const S twice_e2i = twice_e1i_three[1];
+      const S twice_e1i = twice_e1i_three[0];
       const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
-      const auto three_c_e1i = dot(
-          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_twice_e23),
-          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_twice_e23), -four(b.e0i),
-          three_twice_e1i, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e1i),
-          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e1i));
+      const auto c_e1i_three = dot(
+          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(twice_e23_three),
+          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(twice_e23_three), -four(b.e0i),
+          twice_e1i_three, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(twice_e1i_three),
+          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(twice_e1i_three));
       const S twice_e123i = S(2) * m.e123i;
-      const auto three_c_e012i = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
+      const auto c_e012i_three = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
       const S c_e123i = b.e0i * twice_e123i;
       const auto all_e23 =
-          dot(three_b_e23, -three_c_e01, four(m.e123i), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e01),
-              turned<2, 3, 4, 2>(three_m_e1i), -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
-              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
-              turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+          dot(three_b_e23, -c_e01_three, four(m.e123i), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(c_e01_three),
+              turned<2, 3, 4, 2>(three_m_e1i), -c_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+              turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+              turned<2, 3, 4, 2>(c_e12_three), four(m.s));
       const auto all_e1i =
-          dot(three_b_e1i, -four(c_e123i), three_m_e23, three_c_e012i,
-              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e123i),
-              -three_c_e12, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e12), four(m.e123i),
-              three_c_e1i, four(m.s), turned<2, 3, 4, 2>(three_c_e1i),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1i),
+          dot(three_b_e1i, -four(c_e123i), three_m_e23, c_e012i_three,
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(c_e012i_three), four(m.e123i),
+              -c_e12_three, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(c_e12_three), four(m.e123i),
+              c_e1i_three, four(m.s), turned<2, 3, 4, 2>(c_e1i_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e1i_three),
               turned<2, 3, 4, 2>(three_m_e23), four(c_e0i), three_m_e1i);
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
-      const S c_e023i = three_c_e012i[1];
-      const S c_e013i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
-      const auto all_e01 = dot(three_b_e01, three_c_e01, four(m.s), turned<2, 3, 4, 2>(three_c_e01),
-                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01),
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
+      const S c_e023i = c_e012i_three[1];
+      const S c_e013i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
+      const auto all_e01 = dot(three_b_e01, c_e01_three, four(m.s), turned<2, 3, 4, 2>(c_e01_three),
+                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e01_three),
                                turned<2, 3, 4, 2>(three_m_e23));
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
@@ -2375,27 +2375,27 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_l_e23 = four(l.e23, l.e31, l.e12, l.e23);
-      const auto three_c_e12 = dot(-turned<2, 3, 4, 2>(three_l_e23), three_twice_e23, three_l_e23,
-                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto c_e12_three = dot(-turned<2, 3, 4, 2>(three_l_e23), twice_e23_three, three_l_e23,
+                                   turned<2, 3, 4, 2>(twice_e23_three));
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
+      const auto twice_e1i_three = four(S(2)) * three_m_e1i;
       const auto three_l_e1i = four(l.e1i, l.e2i, l.e3i, l.e1i);
-      const auto three_c_e1i =
-          dot(-turned<3, 1, 2, 3>(three_l_e1i), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_l_e1i), turned<3, 1, 2, 3>(three_twice_e23),
-              -turned<3, 1, 2, 3>(three_l_e23), turned<2, 3, 4, 2>(three_twice_e1i),
-              turned<2, 3, 4, 2>(three_l_e23), turned<3, 1, 2, 3>(three_twice_e1i));
-      const auto all_e23 = dot(three_l_e23, -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
-                               turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
-                               turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto c_e1i_three =
+          dot(-turned<3, 1, 2, 3>(three_l_e1i), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_l_e1i), turned<3, 1, 2, 3>(twice_e23_three),
+              -turned<3, 1, 2, 3>(three_l_e23), turned<2, 3, 4, 2>(twice_e1i_three),
+              turned<2, 3, 4, 2>(three_l_e23), turned<3, 1, 2, 3>(twice_e1i_three));
+      const auto all_e23 = dot(three_l_e23, -c_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+                               turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+                               turned<2, 3, 4, 2>(c_e12_three), four(m.s));
       const auto all_e1i =
-          dot(three_l_e1i, -three_c_e12, turned<2, 3, 4, 2>(three_m_e1i),
-              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e1i),
-              -turned<2, 3, 4, 2>(three_c_e12), four(m.e123i), three_c_e1i, four(m.s),
-              turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e23),
-              -turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e23));
+          dot(three_l_e1i, -c_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+              turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+              -turned<2, 3, 4, 2>(c_e12_three), four(m.e123i), c_e1i_three, four(m.s),
+              turned<2, 3, 4, 2>(c_e1i_three), turned<3, 1, 2, 3>(three_m_e23),
+              -turned<3, 1, 2, 3>(c_e1i_three), turned<2, 3, 4, 2>(three_m_e23));
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
               .e12 = all_e23[2],
@@ -2480,56 +2480,56 @@ template <class S>
       const S m_minus_s = m.s - m.e0i;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_c_e012 = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
+      const auto c_e012_three = dot(-turned<3, 1, 2, 3>(three_m_e023i), four(v.e0), four(m.e0123),
                                     turned<3, 1, 2, 3>(three_v_e1));
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S c_e123 = dot(-m.e123i, v.e0, m.e0123, v.ei);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+      const auto c_e1_three = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
                                   turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
                                   -three_m_e1i, four(v.e0), three_m_e01, four(v.ei));
-      const auto three_c_plus_e1 = three_c_e01i + three_c_e1;
-      const auto three_m_plus_e12 =
+      const auto c_plus_e1_three = c_e01i_three + c_e1_three;
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
       const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
-      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+      const auto c_e12i_three = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
                                     turned<3, 1, 2, 3>(three_v_e1));
-      const auto three_c_minus_e1 = -three_c_e01i + three_c_e1;
-      const S c_e023 = three_c_e012[1];
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S c_e031 = three_c_e012[2];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S c_e012 = three_c_e012[0];
-      const S m_minus_e12 = three_m_minus_e12[0];
-      const S c_plus_e3 = three_c_plus_e1[2];
-      const S c_plus_e2 = three_c_plus_e1[1];
-      const S c_plus_e1 = three_c_plus_e1[0];
+      const auto c_minus_e1_three = -c_e01i_three + c_e1_three;
+      const S c_e023 = c_e012_three[1];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S m_minus_e12 = m_minus_e12_three[0];
+      const S c_plus_e3 = c_plus_e1_three[2];
+      const S c_plus_e2 = c_plus_e1_three[1];
+      const S c_plus_e1 = c_plus_e1_three[0];
       const auto all_e1 = mul_add(
           four(S(2)),
-          dot(three_c_plus_e1, four(m_plus_s), turned<2, 3, 4, 2>(three_c_plus_e1),
-              three_m_plus_e12, -turned<3, 1, 2, 3>(three_c_plus_e1),
-              turned<3, 1, 2, 3>(three_m_plus_e12), four(c_e123),
-              turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
-              dot(-three_c_e012, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e012),
-                  turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
+          dot(c_plus_e1_three, four(m_plus_s), turned<2, 3, 4, 2>(c_plus_e1_three),
+              m_plus_e12_three, -turned<3, 1, 2, 3>(c_plus_e1_three),
+              turned<3, 1, 2, 3>(m_plus_e12_three), four(c_e123),
+              turned<2, 3, 4, 2>(m_plus_e12_three), four(S(2)),
+              dot(-c_e012_three, turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(c_e012_three),
+                  turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(c_e012_three), four(m.e123i),
                   -four(c_e0), three_m_e1i)),
           three_v_e1);
-      const S c_e23i = three_c_e12i[1];
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S c_e31i = three_c_e12i[2];
-      const S m_plus_e13 = three_m_plus_e12[2];
-      const S c_e12i = three_c_e12i[0];
-      const S m_plus_e12 = three_m_plus_e12[0];
-      const S c_minus_e3 = three_c_minus_e1[2];
-      const S c_minus_e2 = three_c_minus_e1[1];
-      const S c_minus_e1 = three_c_minus_e1[0];
+      const S c_e23i = c_e12i_three[1];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S m_plus_e13 = m_plus_e12_three[2];
+      const S c_e12i = c_e12i_three[0];
+      const S m_plus_e12 = m_plus_e12_three[0];
+      const S c_minus_e3 = c_minus_e1_three[2];
+      const S c_minus_e2 = c_minus_e1_three[1];
+      const S c_minus_e1 = c_minus_e1_three[0];
       return {.e0 = mul_add(S(2),
                             dot(c_plus_e1, m.e01, c_plus_e2, m.e02, c_plus_e3, m.e03, c_e123,
                                 m.e0123, -c_e012, m_minus_e12, -c_e031, m_minus_e31, -c_e023,
@@ -2618,7 +2618,7 @@ template <class S>
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_c_e01 =
+      const auto c_e01_three =
           dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_m_e23), -three_b_e01,
               four(m.e0i), four(b.e0i), three_m_e01, -turned<3, 1, 2, 3>(three_b_e23),
@@ -2629,66 +2629,66 @@ template <class S>
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const S c_e0i = lanes::total(dot(-three_b_e01, three_m_e1i, three_b_e1i, three_m_e01));
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i),
               turned<3, 1, 2, 3>(three_b_e1i), four(m.e0123));
-      const auto three_c_e12 =
+      const auto c_e12_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
               three_b_e01, turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_b_e1i),
               three_m_e01, three_b_e1i, turned<2, 3, 4, 2>(three_m_e01));
-      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const auto c_plus_e12_three = -c_e012i_three + c_e12_three;
       const S m_plus_s = m.s + m.e0i;
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
               four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e1i));
       const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
-      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
-      const auto three_m_minus_e12 =
+      const auto c_minus_e12_three = c_e012i_three + c_e12_three;
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s - m.e0i;
       const auto all_e23 =
           mul_add(four(S(2)),
-                  dot(-three_c_plus_e12, turned<3, 1, 2, 3>(three_m_plus_e12),
-                      turned<3, 1, 2, 3>(three_c_plus_e12), three_m_plus_e12,
-                      turned<2, 3, 4, 2>(three_c_plus_e12), four(m_plus_s), four(c_e0i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
-                      dot(four(c_e0123), three_m_e1i, -three_c_e01, four(m.e123i),
-                          turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
-                          -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i))),
+                  dot(-c_plus_e12_three, turned<3, 1, 2, 3>(m_plus_e12_three),
+                      turned<3, 1, 2, 3>(c_plus_e12_three), m_plus_e12_three,
+                      turned<2, 3, 4, 2>(c_plus_e12_three), four(m_plus_s), four(c_e0i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), four(S(2)),
+                      dot(four(c_e0123), three_m_e1i, -c_e01_three, four(m.e123i),
+                          turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e1i),
+                          -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e1i))),
                   three_b_e23);
       const auto all_e1i =
           mul_add(four(S(2)),
-                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), -four(c_e0i), three_m_e1i, three_c_e1i,
-                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(-c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), -four(c_e0i), three_m_e1i, c_e1i_three,
+                      four(m_plus_s), turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      -turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_b_e1i);
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
-      const S c_plus_e23 = three_c_plus_e12[1];
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S c_plus_e31 = three_c_plus_e12[2];
-      const S m_plus_e13 = three_m_plus_e12[2];
-      const S c_plus_e12 = three_c_plus_e12[0];
-      const S m_plus_e12 = three_m_plus_e12[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
+      const S c_plus_e23 = c_plus_e12_three[1];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S c_plus_e31 = c_plus_e12_three[2];
+      const S m_plus_e13 = m_plus_e12_three[2];
+      const S c_plus_e12 = c_plus_e12_three[0];
+      const S m_plus_e12 = m_plus_e12_three[0];
       const auto all_e01 =
           mul_add(four(S(2)),
-                  dot(-three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
-                      turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
-                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), -four(c_e0123),
-                      turned<2, 3, 4, 2>(three_m_minus_e12), four(c_e0i), three_m_e01, three_c_e01,
-                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
-                      turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  dot(-c_plus_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+                      turned<3, 1, 2, 3>(c_plus_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+                      -turned<2, 3, 4, 2>(c_plus_e12_three), four(m.e0123), -four(c_e0123),
+                      turned<2, 3, 4, 2>(m_minus_e12_three), four(c_e0i), three_m_e01, c_e01_three,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(c_e01_three), m_minus_e12_three,
+                      turned<3, 1, 2, 3>(c_e01_three), turned<3, 1, 2, 3>(m_minus_e12_three)),
                   three_b_e01);
       return {
           .e23 = all_e23[0],
@@ -2815,76 +2815,76 @@ template <class S>
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_t_e023 = four(t.e023, t.e031, t.e012, t.e023);
       const auto three_t_e01i = four(t.e01i, t.e02i, t.e03i, t.e01i);
-      const auto three_c_e012 =
+      const auto c_e012_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e023), turned<2, 3, 4, 2>(three_m_e23),
               three_t_e023, -four(m.e0i), turned<3, 1, 2, 3>(three_t_e023), -three_m_e01,
               turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e01), three_t_e01i,
               turned<3, 1, 2, 3>(three_m_e01), four(t.e123));
       const S m_minus_s = m.s - m.e0i;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_t_e23i = four(t.e23i, t.e31i, t.e12i, t.e23i);
       const S c_e123 = lanes::total(dot(-three_m_e1i, three_t_e023, three_m_e01, three_t_e23i));
       const S c_e0 = dot(m.e023i, t.e023, m.e031i, t.e031, m.e012i, t.e012, -m.e0123, t.e123);
-      const auto three_c_e1 =
+      const auto c_e1_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_t_e01i),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_t_e01i), four(m.e123i),
               three_t_e023, -four(m.e0123), three_t_e23i);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_t_e01i),
               turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_t_e01i),
               -turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_t_e023),
               turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_t_e023),
               -turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_t_e23i),
               turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_t_e23i));
-      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
+      const auto c_plus_e1_three = c_e1_three + c_e01i_three;
       const S m_plus_s = m.s + m.e0i;
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const auto three_c_e12i =
+      const auto c_e12i_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_t_e23i), turned<2, 3, 4, 2>(three_m_e23),
               three_t_e23i, four(m.e0i), turned<3, 1, 2, 3>(three_t_e23i), -three_m_e1i,
               turned<2, 3, 4, 2>(three_t_e01i), turned<2, 3, 4, 2>(three_m_e1i), three_t_e01i,
               -turned<3, 1, 2, 3>(three_m_e1i), four(t.e123));
       const S c_ei = dot(-m.e023i, t.e23i, -m.e031i, t.e31i, -m.e012i, t.e12i, m.e123i, t.e123);
-      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto c_minus_e1_three = c_e1_three - c_e01i_three;
       const auto all_e023 = mul_add(
           four(S(2)),
-          dot(-three_c_plus_e1, four(m.e0123), turned<2, 3, 4, 2>(three_c_plus_e1),
-              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(three_c_plus_e1),
-              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
-              four(c_e123), three_m_e01, three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
-              -turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
-              turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          dot(-c_plus_e1_three, four(m.e0123), turned<2, 3, 4, 2>(c_plus_e1_three),
+              turned<3, 1, 2, 3>(three_m_e01), -turned<3, 1, 2, 3>(c_plus_e1_three),
+              turned<2, 3, 4, 2>(three_m_e01), four(c_e0), turned<2, 3, 4, 2>(m_minus_e12_three),
+              four(c_e123), three_m_e01, c_e012_three, turned<3, 1, 2, 3>(m_minus_e12_three),
+              -turned<3, 1, 2, 3>(c_e012_three), m_minus_e12_three,
+              turned<2, 3, 4, 2>(c_e012_three), four(m_minus_s)),
           three_t_e023);
-      const S c_e023 = three_c_e012[1];
-      const S c_e031 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
-      const S c_plus_e3 = three_c_plus_e1[2];
-      const S m_plus_e12 = three_m_plus_e12[0];
-      const S c_plus_e2 = three_c_plus_e1[1];
-      const S m_plus_e13 = three_m_plus_e12[2];
-      const S c_plus_e1 = three_c_plus_e1[0];
-      const S m_plus_e23 = three_m_plus_e12[1];
+      const S c_e023 = c_e012_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S c_plus_e3 = c_plus_e1_three[2];
+      const S m_plus_e12 = m_plus_e12_three[0];
+      const S c_plus_e2 = c_plus_e1_three[1];
+      const S m_plus_e13 = m_plus_e12_three[2];
+      const S c_plus_e1 = c_plus_e1_three[0];
+      const S m_plus_e23 = m_plus_e12_three[1];
       const auto all_e01i =
           mul_add(four(S(2)),
-                  dot(three_c_plus_e1, four(m_plus_s), turned<2, 3, 4, 2>(three_c_plus_e1),
-                      three_m_plus_e12, -turned<3, 1, 2, 3>(three_c_plus_e1),
-                      turned<3, 1, 2, 3>(three_m_plus_e12), four(c_e123),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
-                      dot(-four(c_e0), three_m_e1i, -three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
-                          turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
-                          -turned<2, 3, 4, 2>(three_c_e012), four(m.e123i))),
+                  dot(c_plus_e1_three, four(m_plus_s), turned<2, 3, 4, 2>(c_plus_e1_three),
+                      m_plus_e12_three, -turned<3, 1, 2, 3>(c_plus_e1_three),
+                      turned<3, 1, 2, 3>(m_plus_e12_three), four(c_e123),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), four(S(2)),
+                      dot(-four(c_e0), three_m_e1i, -c_e012_three, turned<2, 3, 4, 2>(three_m_e1i),
+                          turned<3, 1, 2, 3>(c_e012_three), turned<3, 1, 2, 3>(three_m_e1i),
+                          -turned<2, 3, 4, 2>(c_e012_three), four(m.e123i))),
                   three_t_e01i);
       const auto all_e23i = mul_add(
           four(S(2)),
-          dot(three_c_minus_e1, four(m.e123i), -turned<2, 3, 4, 2>(three_c_minus_e1),
-              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e1),
-              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(three_m_plus_e12),
-              -four(c_e123), three_m_e1i, -three_c_e12i, turned<3, 1, 2, 3>(three_m_plus_e12),
-              turned<3, 1, 2, 3>(three_c_e12i), three_m_plus_e12, turned<2, 3, 4, 2>(three_c_e12i),
+          dot(c_minus_e1_three, four(m.e123i), -turned<2, 3, 4, 2>(c_minus_e1_three),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(c_minus_e1_three),
+              turned<2, 3, 4, 2>(three_m_e1i), -four(c_ei), turned<2, 3, 4, 2>(m_plus_e12_three),
+              -four(c_e123), three_m_e1i, -c_e12i_three, turned<3, 1, 2, 3>(m_plus_e12_three),
+              turned<3, 1, 2, 3>(c_e12i_three), m_plus_e12_three, turned<2, 3, 4, 2>(c_e12i_three),
               four(m_plus_s)),
           three_t_e23i);
       return {
@@ -3013,54 +3013,54 @@ template <class S>
       const S m_minus_s = m.s - m.e0i;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_q_e023i = four(q.e023i, q.e031i, q.e012i, q.e023i);
-      const auto three_c_e01 = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
+      const auto c_e01_three = dot(three_m_e023i, four(q.e0123), -four(m.e0123), three_q_e023i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S c_e0i = dot(m.e123i, q.e0123, -m.e0123, q.e123i);
-      const auto three_c_e12 = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
+      const auto c_e12_three = dot(-three_m_e023i, turned<2, 3, 4, 2>(three_q_e023i),
                                    turned<2, 3, 4, 2>(three_m_e023i), three_q_e023i);
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-three_m_e23, turned<2, 3, 4, 2>(three_q_e023i), turned<2, 3, 4, 2>(three_m_e23),
               three_q_e023i, -turned<3, 1, 2, 3>(three_m_e1i), four(q.e0123),
               turned<3, 1, 2, 3>(three_m_e01), four(q.e123i));
-      const auto three_c_plus_e12 = three_c_e12 - three_c_e012i;
-      const auto three_m_plus_e12 =
+      const auto c_plus_e12_three = c_e12_three - c_e012i_three;
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
       const S c_e123i = dot(m.e0i, q.e123i, -m.e1i, q.e023i, -m.e2i, q.e031i, -m.e3i, q.e012i);
-      const auto three_c_e1i = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
-      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
-      const S c_e03 = three_c_e01[2];
-      const S m_minus_e12 = three_m_minus_e12[0];
-      const S c_e02 = three_c_e01[1];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S c_e01 = three_c_e01[0];
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S c_plus_e23 = three_c_plus_e12[1];
-      const S c_plus_e31 = three_c_plus_e12[2];
-      const S c_plus_e12 = three_c_plus_e12[0];
+      const auto c_e1i_three = dot(-three_m_e023i, four(q.e123i), four(m.e123i), three_q_e023i);
+      const auto c_minus_e12_three = c_e12_three + c_e012i_three;
+      const S c_e03 = c_e01_three[2];
+      const S m_minus_e12 = m_minus_e12_three[0];
+      const S c_e02 = c_e01_three[1];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S c_e01 = c_e01_three[0];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S c_plus_e23 = c_plus_e12_three[1];
+      const S c_plus_e31 = c_plus_e12_three[2];
+      const S c_plus_e12 = c_plus_e12_three[0];
       const auto all_e023i =
           mul_add(four(S(2)),
-                  dot(three_c_plus_e12, turned<3, 1, 2, 3>(three_m_plus_e12),
-                      -turned<3, 1, 2, 3>(three_c_plus_e12), three_m_plus_e12,
-                      -turned<2, 3, 4, 2>(three_c_plus_e12), four(m_plus_s), -four(c_e0i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), four(S(2)),
-                      dot(three_c_e01, four(m.e123i), -turned<2, 3, 4, 2>(three_c_e01),
-                          turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(three_c_e01),
+                  dot(c_plus_e12_three, turned<3, 1, 2, 3>(m_plus_e12_three),
+                      -turned<3, 1, 2, 3>(c_plus_e12_three), m_plus_e12_three,
+                      -turned<2, 3, 4, 2>(c_plus_e12_three), four(m_plus_s), -four(c_e0i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), four(S(2)),
+                      dot(c_e01_three, four(m.e123i), -turned<2, 3, 4, 2>(c_e01_three),
+                          turned<3, 1, 2, 3>(three_m_e1i), turned<3, 1, 2, 3>(c_e01_three),
                           turned<2, 3, 4, 2>(three_m_e1i), -four(c_e0123), three_m_e1i)),
                   three_q_e023i);
-      const S c_e3i = three_c_e1i[2];
-      const S m_plus_e12 = three_m_plus_e12[0];
-      const S c_e2i = three_c_e1i[1];
-      const S m_plus_e13 = three_m_plus_e12[2];
-      const S c_e1i = three_c_e1i[0];
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S c_minus_e23 = three_c_minus_e12[1];
-      const S c_minus_e31 = three_c_minus_e12[2];
-      const S c_minus_e12 = three_c_minus_e12[0];
+      const S c_e3i = c_e1i_three[2];
+      const S m_plus_e12 = m_plus_e12_three[0];
+      const S c_e2i = c_e1i_three[1];
+      const S m_plus_e13 = m_plus_e12_three[2];
+      const S c_e1i = c_e1i_three[0];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S c_minus_e23 = c_minus_e12_three[1];
+      const S c_minus_e31 = c_minus_e12_three[2];
+      const S c_minus_e12 = c_minus_e12_three[0];
       return {.e0123 = mul_add(S(2),
                                dot(-c_plus_e12, m.e03, -c_plus_e31, m.e02, -c_plus_e23, m.e01,
                                    -c_e0i, m.e0123, c_e01, m_minus_e23, c_e02, m_minus_e31, c_e03,
@@ -3146,49 +3146,49 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e012 = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
+      const auto c_e012_three = turned<3, 1, 2, 3>(three_m_e023i) * four(v.e0);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S c_e0 = m.e0i * v.e0;
       const S m_minus_s = m.s - m.e0i;
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_v_e1),
               -turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_v_e1));
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e1 = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
+      const auto c_e1_three = dot(-turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_v_e1),
                                   turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_v_e1),
                                   -three_m_e1i, four(v.e0));
-      const auto three_c_minus_e1 = -three_c_e01i + three_c_e1;
+      const auto c_minus_e1_three = -c_e01i_three + c_e1_three;
       const S c_e123 = m.e123i * v.e0;
       const S c_ei = dot(m.e0i, v.ei, -m.e1i, v.e1, -m.e2i, v.e2, -m.e3i, v.e3);
       const S m_plus_s = m.s + m.e0i;
-      const auto three_c_e12i = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
+      const auto c_e12i_three = dot(turned<3, 1, 2, 3>(three_m_e023i), four(v.ei), -four(m.e123i),
                                     turned<3, 1, 2, 3>(three_v_e1));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const S c_e023 = three_c_e012[1];
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S c_e013 = three_c_e012[2];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S c_e012 = three_c_e012[0];
-      const S m_minus_e12 = three_m_minus_e12[0];
+      const S c_e023 = c_e012_three[1];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S c_e013 = c_e012_three[2];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S m_minus_e12 = m_minus_e12_three[0];
       const auto all_e1 =
           mul_add(four(S(2)),
-                  dot(four(c_e123), turned<2, 3, 4, 2>(three_m_minus_e12), three_c_minus_e1,
-                      four(m_minus_s), -turned<2, 3, 4, 2>(three_c_minus_e1), three_m_minus_e12,
-                      turned<3, 1, 2, 3>(three_c_minus_e1), turned<3, 1, 2, 3>(three_m_minus_e12)),
+                  dot(four(c_e123), turned<2, 3, 4, 2>(m_minus_e12_three), c_minus_e1_three,
+                      four(m_minus_s), -turned<2, 3, 4, 2>(c_minus_e1_three), m_minus_e12_three,
+                      turned<3, 1, 2, 3>(c_minus_e1_three), turned<3, 1, 2, 3>(m_minus_e12_three)),
                   three_v_e1);
-      const S c_e23i = three_c_e12i[1];
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S c_e31i = three_c_e12i[2];
-      const S m_plus_e13 = three_m_plus_e12[2];
-      const S c_e12i = three_c_e12i[0];
-      const S m_plus_e12 = three_m_plus_e12[0];
-      const S c_minus_e3 = three_c_minus_e1[2];
-      const S c_minus_e2 = three_c_minus_e1[1];
-      const S c_minus_e1 = three_c_minus_e1[0];
+      const S c_e23i = c_e12i_three[1];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S m_plus_e13 = m_plus_e12_three[2];
+      const S c_e12i = c_e12i_three[0];
+      const S m_plus_e12 = m_plus_e12_three[0];
+      const S c_minus_e3 = c_minus_e1_three[2];
+      const S c_minus_e2 = c_minus_e1_three[1];
+      const S c_minus_e1 = c_minus_e1_three[0];
       return {.e0 = mul_add(S(2),
                             dot(-c_e0, m_minus_s, c_e012, m_minus_e12, c_e013, m_minus_e31, c_e023,
                                 m_minus_e23),
@@ -3268,61 +3268,61 @@ template <class S>
       const S c_e0i = dot(b.e01, m.e1i, b.e02, m.e2i, b.e03, m.e3i);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_c_e12 =
+      const auto c_e12_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e23, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_b_e01), three_m_e1i,
               three_b_e01, turned<2, 3, 4, 2>(three_m_e1i));
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(-turned<2, 3, 4, 2>(three_b_e23), three_m_e023i, three_b_e23,
               turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_b_e01), four(m.e123i));
-      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const auto c_minus_e12_three = c_e12_three + c_e012i_three;
       const S m_minus_s = m.s - m.e0i;
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(-turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_m_e23),
               turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_m_e23), three_b_e1i,
               four(m.e0i), -four(b.e0i), three_m_e1i, -turned<3, 1, 2, 3>(three_b_e23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<2, 3, 4, 2>(three_b_e23),
               turned<3, 1, 2, 3>(three_m_e1i));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
       const S c_e123i = dot(b.e1i, m.e023i, b.e2i, m.e031i, b.e3i, m.e012i, -b.e0i, m.e123i);
       const S c_e0123 = dot(b.e01, m.e023i, b.e02, m.e031i, b.e03, m.e012i);
-      const auto three_c_e01 = dot(-turned<3, 1, 2, 3>(three_b_e01),
+      const auto c_e01_three = dot(-turned<3, 1, 2, 3>(three_b_e01),
                                    turned<2, 3, 4, 2>(three_m_e23), turned<2, 3, 4, 2>(three_b_e01),
                                    turned<3, 1, 2, 3>(three_m_e23), -three_b_e01, four(m.e0i));
       const auto all_e23 = mul_add(four(S(2)),
-                                   dot(three_c_minus_e12, turned<3, 1, 2, 3>(three_m_minus_e12),
-                                       -turned<3, 1, 2, 3>(three_c_minus_e12), three_m_minus_e12,
-                                       turned<2, 3, 4, 2>(three_c_minus_e12), four(m_minus_s),
-                                       -four(c_e0i), turned<2, 3, 4, 2>(three_m_minus_e12)),
+                                   dot(c_minus_e12_three, turned<3, 1, 2, 3>(m_minus_e12_three),
+                                       -turned<3, 1, 2, 3>(c_minus_e12_three), m_minus_e12_three,
+                                       turned<2, 3, 4, 2>(c_minus_e12_three), four(m_minus_s),
+                                       -four(c_e0i), turned<2, 3, 4, 2>(m_minus_e12_three)),
                                    three_b_e23);
       const auto all_e1i =
           mul_add(four(S(2)),
-                  dot(-three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      -turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e0i),
-                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(three_m_plus_e12), three_c_e1i,
-                      four(m_plus_s), turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      -turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(-c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      -turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e0i),
+                      three_m_e1i, four(c_e123i), turned<2, 3, 4, 2>(m_plus_e12_three), c_e1i_three,
+                      four(m_plus_s), turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      -turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_b_e1i);
-      const S c_minus_e23 = three_c_minus_e12[1];
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S c_minus_e31 = three_c_minus_e12[2];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S c_minus_e12 = three_c_minus_e12[0];
-      const S m_minus_e12 = three_m_minus_e12[0];
+      const S c_minus_e23 = c_minus_e12_three[1];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S c_minus_e31 = c_minus_e12_three[2];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S c_minus_e12 = c_minus_e12_three[0];
+      const S m_minus_e12 = m_minus_e12_three[0];
       const auto all_e01 = mul_add(
           four(S(2)),
-          dot(three_c_e01, four(m_minus_s), -turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
-              turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12), four(c_e0123),
-              turned<2, 3, 4, 2>(three_m_minus_e12)),
+          dot(c_e01_three, four(m_minus_s), -turned<2, 3, 4, 2>(c_e01_three), m_minus_e12_three,
+              turned<3, 1, 2, 3>(c_e01_three), turned<3, 1, 2, 3>(m_minus_e12_three), four(c_e0123),
+              turned<2, 3, 4, 2>(m_minus_e12_three)),
           three_b_e01);
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
@@ -3428,48 +3428,48 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
-      const auto three_twice_e1i = four(S(2)) * three_m_e1i;
-      const S twice_e3i = three_twice_e1i[2];
-      const S twice_e2i = three_twice_e1i[1];
-      const S twice_e1i = three_twice_e1i[0];
+      const auto twice_e1i_three = four(S(2)) * three_m_e1i;
+      const S twice_e3i = twice_e1i_three[2];
+      const S twice_e2i = twice_e1i_three[1];
+      const S twice_e1i = twice_e1i_three[0];
       const S c_e0i = dot(b.e01, twice_e1i, b.e02, twice_e2i, b.e03, twice_e3i);
       const S twice_e123i = S(2) * m.e123i;
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
-      const auto three_c_e012i = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
+      const auto c_e012i_three = turned<3, 1, 2, 3>(three_b_e01) * four(twice_e123i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
-      const auto three_c_e12 =
-          dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
-              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_b_e01),
-              three_twice_e1i, three_b_e01, turned<2, 3, 4, 2>(three_twice_e1i));
-      const auto three_c_minus_e12 = -three_c_e012i + three_c_e12;
+      const auto c_e12_three =
+          dot(-turned<2, 3, 4, 2>(three_b_e23), twice_e23_three, three_b_e23,
+              turned<2, 3, 4, 2>(twice_e23_three), -turned<2, 3, 4, 2>(three_b_e01),
+              twice_e1i_three, three_b_e01, turned<2, 3, 4, 2>(twice_e1i_three));
+      const auto c_minus_e12_three = -c_e012i_three + c_e12_three;
       const auto three_b_e1i = four(b.e1i, b.e2i, b.e3i, b.e1i);
-      const auto three_c_e1i = dot(
-          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(three_twice_e23),
-          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(three_twice_e23), -four(b.e0i),
-          three_twice_e1i, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e1i),
-          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e1i));
+      const auto c_e1i_three = dot(
+          -turned<3, 1, 2, 3>(three_b_e1i), turned<2, 3, 4, 2>(twice_e23_three),
+          turned<2, 3, 4, 2>(three_b_e1i), turned<3, 1, 2, 3>(twice_e23_three), -four(b.e0i),
+          twice_e1i_three, -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(twice_e1i_three),
+          turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(twice_e1i_three));
       const S c_e123i = b.e0i * twice_e123i;
-      const auto three_c_e01 =
-          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23));
+      const auto c_e01_three =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(twice_e23_three));
       const auto all_e23 =
-          dot(three_b_e23, -three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e23),
-              turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e23),
-              turned<2, 3, 4, 2>(three_c_minus_e12), four(m.s), four(c_e0i), three_m_e23);
+          dot(three_b_e23, -c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+              turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+              turned<2, 3, 4, 2>(c_minus_e12_three), four(m.s), four(c_e0i), three_m_e23);
       const auto all_e1i =
-          dot(three_b_e1i, -four(c_e123i), three_m_e23, -three_c_minus_e12,
-              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_c_minus_e12),
-              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(three_c_minus_e12),
-              four(m.e123i), three_c_e1i, four(m.s), turned<2, 3, 4, 2>(three_c_e1i),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e1i),
+          dot(three_b_e1i, -four(c_e123i), three_m_e23, -c_minus_e12_three,
+              turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(c_minus_e12_three),
+              turned<3, 1, 2, 3>(three_m_e1i), -turned<2, 3, 4, 2>(c_minus_e12_three),
+              four(m.e123i), c_e1i_three, four(m.s), turned<2, 3, 4, 2>(c_e1i_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e1i_three),
               turned<2, 3, 4, 2>(three_m_e23), four(c_e0i), three_m_e1i);
-      const S c_minus_e23 = three_c_minus_e12[1];
-      const S c_minus_e31 = three_c_minus_e12[2];
-      const S c_minus_e12 = three_c_minus_e12[0];
-      const auto all_e01 = dot(three_b_e01, three_c_e01, four(m.s), turned<2, 3, 4, 2>(three_c_e01),
-                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e01),
+      const S c_minus_e23 = c_minus_e12_three[1];
+      const S c_minus_e31 = c_minus_e12_three[2];
+      const S c_minus_e12 = c_minus_e12_three[0];
+      const auto all_e01 = dot(three_b_e01, c_e01_three, four(m.s), turned<2, 3, 4, 2>(c_e01_three),
+                               turned<3, 1, 2, 3>(three_m_e23), -turned<3, 1, 2, 3>(c_e01_three),
                                turned<2, 3, 4, 2>(three_m_e23));
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],

@@ -61,30 +61,30 @@ template <class S>
       using lanes::turned;
       const S half_d = S(0.5) * w.d;
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_half_w23 = four(S(0.5)) * three_w_w23;
+      const auto half_w23_three = four(S(0.5)) * three_w_w23;
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
-      const auto three_half_v1 = four(S(0.5)) * three_w_v1;
-      const S half_w12 = three_half_w23[2];
-      const S half_w31 = three_half_w23[1];
-      const S half_w23 = three_half_w23[0];
+      const auto half_v1_three = four(S(0.5)) * three_w_v1;
+      const S half_w12 = half_w23_three[2];
+      const S half_w31 = half_w23_three[1];
+      const S half_w23 = half_w23_three[0];
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto all_e23 = dot(-three_half_w23, four(m.s), turned<3, 1, 2, 3>(three_half_w23),
-                               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(three_half_w23),
+      const auto all_e23 = dot(-half_w23_three, four(m.s), turned<3, 1, 2, 3>(half_w23_three),
+                               turned<2, 3, 4, 2>(three_m_e23), -turned<2, 3, 4, 2>(half_w23_three),
                                turned<3, 1, 2, 3>(three_m_e23), four(half_d), three_m_e023i);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto all_e1i =
-          dot(-four(half_d), three_m_e1i, turned<3, 1, 2, 3>(three_half_w23),
-              turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(three_half_w23),
-              turned<3, 1, 2, 3>(three_m_e1i), three_half_w23, four(m.e123i), -three_half_v1,
-              four(m.s), turned<3, 1, 2, 3>(three_half_v1), turned<2, 3, 4, 2>(three_m_e23),
-              -turned<2, 3, 4, 2>(three_half_v1), turned<3, 1, 2, 3>(three_m_e23), -three_half_v1,
-              four(m.e0i), turned<3, 1, 2, 3>(three_half_v1), turned<2, 3, 4, 2>(three_m_e023i),
-              -turned<2, 3, 4, 2>(three_half_v1), turned<3, 1, 2, 3>(three_m_e023i));
+          dot(-four(half_d), three_m_e1i, turned<3, 1, 2, 3>(half_w23_three),
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<2, 3, 4, 2>(half_w23_three),
+              turned<3, 1, 2, 3>(three_m_e1i), half_w23_three, four(m.e123i), -half_v1_three,
+              four(m.s), turned<3, 1, 2, 3>(half_v1_three), turned<2, 3, 4, 2>(three_m_e23),
+              -turned<2, 3, 4, 2>(half_v1_three), turned<3, 1, 2, 3>(three_m_e23), -half_v1_three,
+              four(m.e0i), turned<3, 1, 2, 3>(half_v1_three), turned<2, 3, 4, 2>(three_m_e023i),
+              -turned<2, 3, 4, 2>(half_v1_three), turned<3, 1, 2, 3>(three_m_e023i));
       const auto all_e023i =
-          dot(four(half_d), three_m_e23, -three_half_w23, four(m.e0i),
-              turned<3, 1, 2, 3>(three_half_w23), turned<2, 3, 4, 2>(three_m_e023i),
-              -turned<2, 3, 4, 2>(three_half_w23), turned<3, 1, 2, 3>(three_m_e023i));
+          dot(four(half_d), three_m_e23, -half_w23_three, four(m.e0i),
+              turned<3, 1, 2, 3>(half_w23_three), turned<2, 3, 4, 2>(three_m_e023i),
+              -turned<2, 3, 4, 2>(half_w23_three), turned<3, 1, 2, 3>(three_m_e023i));
       return {.s = dot(half_w23, m.e23, half_w31, m.e31, half_w12, m.e12, half_d, m.e0i),
               .e23 = all_e23[0],
               .e31 = all_e23[1],
@@ -93,8 +93,8 @@ template <class S>
               .e2i = all_e1i[1],
               .e3i = all_e1i[2],
               .e123i = mul_add(-half_d, m.e123i,
-                               lanes::total(dot(-three_half_w23, three_m_e1i, -three_half_v1,
-                                                three_m_e23, -three_half_v1, three_m_e023i))),
+                               lanes::total(dot(-half_w23_three, three_m_e1i, -half_v1_three,
+                                                three_m_e23, -half_v1_three, three_m_e023i))),
               .e0i = dot(half_d, m.s, half_w23, m.e023i, half_w31, m.e031i, half_w12, m.e012i),
               .e023i = all_e023i[0],
               .e031i = all_e023i[1],
@@ -143,46 +143,46 @@ template <class S>
       using lanes::turned;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_c_e012i = dot(three_m_e023i, turned<2, 3, 4, 2>(three_w_w23),
+      const auto c_e012i_three = dot(three_m_e023i, turned<2, 3, 4, 2>(three_w_w23),
                                      -turned<2, 3, 4, 2>(three_m_e023i), three_w_w23);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_c_e12 = dot(three_m_e23, turned<2, 3, 4, 2>(three_w_w23),
+      const auto c_e12_three = dot(three_m_e23, turned<2, 3, 4, 2>(three_w_w23),
                                    -turned<2, 3, 4, 2>(three_m_e23), three_w_w23);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_v1),
               -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_v1), -four(m.e0i),
               three_w_v1, -three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
               turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e1i),
               turned<2, 3, 4, 2>(three_w_w23));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
       const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
-      const auto three_c_minus_e12 = three_c_e12 + three_c_e012i;
+      const auto c_minus_e12_three = c_e12_three + c_e012i_three;
       const auto all_w23 = mul_add(
           four(S(2)),
-          dot(three_c_e12, turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(three_c_e12), four(m.s),
-              -three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i)),
+          dot(c_e12_three, turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(c_e12_three), four(m.s),
+              -c_e012i_three, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(c_e012i_three), four(m.e0i)),
           three_w_w23);
       const auto all_v1 =
           mul_add(four(S(2)),
-                  dot(three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      -turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), -three_c_e1i, four(m_plus_s),
-                      -turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), -c_e1i_three, four(m_plus_s),
+                      -turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_w_v1);
-      const S c_e023i = three_c_e012i[1];
-      const S c_e031i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
-      const S c_e23 = three_c_e12[1];
-      const S c_e31 = three_c_e12[2];
-      const S c_e12 = three_c_e12[0];
+      const S c_e023i = c_e012i_three[1];
+      const S c_e031i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
+      const S c_e23 = c_e12_three[1];
+      const S c_e31 = c_e12_three[2];
+      const S c_e12 = c_e12_three[0];
       return {.w23 = all_w23[0],
               .w31 = all_w23[1],
               .w12 = all_w23[2],
@@ -259,51 +259,51 @@ template <class S>
       const S c_e123 = dot(m.e1i, mu.p1, m.e2i, mu.p2, m.e3i, mu.p3);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
-      const auto three_c_e012 =
+      const auto c_e012_three =
           dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_p1), -turned<2, 3, 4, 2>(three_m_e23),
               three_mu_p1, four(m.e0i), turned<3, 1, 2, 3>(three_mu_p1));
       const S c_e0 = dot(m.e023i, mu.p1, m.e031i, mu.p2, m.e012i, mu.p3);
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_mu_l23),
               -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_mu_l23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_mu_p1),
               -turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_mu_p1));
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e1 =
+      const auto c_e1_three =
           dot(-turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_mu_l23),
               turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_mu_l23), -four(m.e123i),
               three_mu_p1);
       const auto all_l23 = mul_add(
           four(S(2)),
-          dot(-three_c_e1, four(m.e0i), -turned<2, 3, 4, 2>(three_c_e1),
-              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e1),
-              turned<2, 3, 4, 2>(three_m_e023i), -three_c_e01i, four(m.s),
-              -turned<2, 3, 4, 2>(three_c_e01i), turned<3, 1, 2, 3>(three_m_e23),
-              turned<3, 1, 2, 3>(three_c_e01i), turned<2, 3, 4, 2>(three_m_e23), -four(c_e0),
-              three_m_e1i, three_c_e012, turned<2, 3, 4, 2>(three_m_e1i),
-              -turned<3, 1, 2, 3>(three_c_e012), turned<3, 1, 2, 3>(three_m_e1i),
-              turned<2, 3, 4, 2>(three_c_e012), four(m.e123i), -four(c_e123), three_m_e023i),
+          dot(-c_e1_three, four(m.e0i), -turned<2, 3, 4, 2>(c_e1_three),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(c_e1_three),
+              turned<2, 3, 4, 2>(three_m_e023i), -c_e01i_three, four(m.s),
+              -turned<2, 3, 4, 2>(c_e01i_three), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(c_e01i_three), turned<2, 3, 4, 2>(three_m_e23), -four(c_e0),
+              three_m_e1i, c_e012_three, turned<2, 3, 4, 2>(three_m_e1i),
+              -turned<3, 1, 2, 3>(c_e012_three), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<2, 3, 4, 2>(c_e012_three), four(m.e123i), -four(c_e123), three_m_e023i),
           three_mu_l23);
       const auto all_p1 =
           mul_add(four(S(2)),
-                  dot(-four(c_e0), three_m_e23, four(c_e0), three_m_e023i, three_c_e012,
-                      turned<2, 3, 4, 2>(three_m_e23), -three_c_e012,
-                      turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(three_c_e012),
-                      turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(three_c_e012),
-                      turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(three_c_e012),
-                      four(m.s), turned<2, 3, 4, 2>(three_c_e012), four(m.e0i)),
+                  dot(-four(c_e0), three_m_e23, four(c_e0), three_m_e023i, c_e012_three,
+                      turned<2, 3, 4, 2>(three_m_e23), -c_e012_three,
+                      turned<2, 3, 4, 2>(three_m_e023i), -turned<3, 1, 2, 3>(c_e012_three),
+                      turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(c_e012_three),
+                      turned<3, 1, 2, 3>(three_m_e023i), -turned<2, 3, 4, 2>(c_e012_three),
+                      four(m.s), turned<2, 3, 4, 2>(c_e012_three), four(m.e0i)),
                   three_mu_p1);
-      const S c_e023 = three_c_e012[1];
-      const S c_e031 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
-      const S c_e03i = three_c_e01i[2];
-      const S c_e02i = three_c_e01i[1];
-      const S c_e01i = three_c_e01i[0];
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S c_e03i = c_e01i_three[2];
+      const S c_e02i = c_e01i_three[1];
+      const S c_e01i = c_e01i_three[0];
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
       return {.l23 = all_l23[0],
               .l31 = all_l23[1],
               .l12 = all_l23[2],

@@ -149,58 +149,58 @@ template <class S>
       using lanes::turned;
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) - turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s - m.e0i;
-      const S m_plus_e23 = three_m_plus_e12[1];
-      const S m_plus_e31 = three_m_plus_e12[2];
-      const S m_plus_e12 = three_m_plus_e12[0];
+      const S m_plus_e23 = m_plus_e12_three[1];
+      const S m_plus_e31 = m_plus_e12_three[2];
+      const S m_plus_e12 = m_plus_e12_three[0];
       const S plus_s =
           dot(m.e01, w.v1, m.e02, w.v2, m.e03, w.v3, S(0.5),
               dot(-m_plus_s, w.d, m_plus_e12, w.w12, m_plus_e31, w.w31, m_plus_e23, w.w23));
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s + m.e0i;
-      const S m_minus_e23 = three_m_minus_e12[1];
-      const S m_minus_e31 = three_m_minus_e12[2];
-      const S m_minus_e12 = three_m_minus_e12[0];
+      const S m_minus_e23 = m_minus_e12_three[1];
+      const S m_minus_e31 = m_minus_e12_three[2];
+      const S m_minus_e12 = m_minus_e12_three[0];
       const S minus_s =
           dot(m.e1i, w.u1, m.e2i, w.u2, m.e3i, w.u3, S(0.5),
               dot(m_minus_s, w.d, m_minus_e12, w.w12, m_minus_e31, w.w31, m_minus_e23, w.w23));
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_plus_e23 =
+      const auto plus_e23_three =
           dot(turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_w_v1),
               -turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_w_v1), four(m.e0123),
               three_w_v1, four(S(0.5)),
-              dot(-four(m_plus_s), three_w_w23, -three_m_plus_e12, turned<2, 3, 4, 2>(three_w_w23),
-                  turned<3, 1, 2, 3>(three_m_plus_e12), turned<3, 1, 2, 3>(three_w_w23),
-                  -turned<2, 3, 4, 2>(three_m_plus_e12), four(w.d)));
+              dot(-four(m_plus_s), three_w_w23, -m_plus_e12_three, turned<2, 3, 4, 2>(three_w_w23),
+                  turned<3, 1, 2, 3>(m_plus_e12_three), turned<3, 1, 2, 3>(three_w_w23),
+                  -turned<2, 3, 4, 2>(m_plus_e12_three), four(w.d)));
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_w_u1 = four(w.u1, w.u2, w.u3, w.u1);
-      const auto three_minus_e23 = dot(
+      const auto minus_e23_three = dot(
           turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_w_u1),
           -turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_w_u1), four(m.e123i),
           three_w_u1, four(S(0.5)),
-          dot(-four(m_minus_s), three_w_w23, -three_m_minus_e12, turned<2, 3, 4, 2>(three_w_w23),
-              turned<3, 1, 2, 3>(three_m_minus_e12), turned<3, 1, 2, 3>(three_w_w23),
-              turned<2, 3, 4, 2>(three_m_minus_e12), four(w.d)));
-      const auto all_e23 = four(S(0.5)) * (three_plus_e23 + three_minus_e23);
+          dot(-four(m_minus_s), three_w_w23, -m_minus_e12_three, turned<2, 3, 4, 2>(three_w_w23),
+              turned<3, 1, 2, 3>(m_minus_e12_three), turned<3, 1, 2, 3>(three_w_w23),
+              turned<2, 3, 4, 2>(m_minus_e12_three), four(w.d)));
+      const auto all_e23 = four(S(0.5)) * (plus_e23_three + minus_e23_three);
       const auto all_e1i =
           four(S(0.5)) * dot(-three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
                              turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e1i),
                              turned<2, 3, 4, 2>(three_w_w23), four(m.e123i), three_w_w23,
-                             -four(m_minus_s), three_w_v1, -three_m_minus_e12,
-                             turned<2, 3, 4, 2>(three_w_v1), turned<3, 1, 2, 3>(three_m_minus_e12),
+                             -four(m_minus_s), three_w_v1, -m_minus_e12_three,
+                             turned<2, 3, 4, 2>(three_w_v1), turned<3, 1, 2, 3>(m_minus_e12_three),
                              turned<3, 1, 2, 3>(three_w_v1));
-      const auto all_e023i = four(S(-0.5)) * (three_plus_e23 - three_minus_e23);
+      const auto all_e023i = four(S(-0.5)) * (plus_e23_three - minus_e23_three);
       const auto all_e01 =
           four(S(0.5)) * dot(three_m_e01, four(w.d), turned<2, 3, 4, 2>(three_m_e01),
                              turned<3, 1, 2, 3>(three_w_w23), -turned<3, 1, 2, 3>(three_m_e01),
                              turned<2, 3, 4, 2>(three_w_w23), four(m.e0123), three_w_w23,
-                             -four(m_plus_s), three_w_u1, -three_m_plus_e12,
-                             turned<2, 3, 4, 2>(three_w_u1), turned<3, 1, 2, 3>(three_m_plus_e12),
+                             -four(m_plus_s), three_w_u1, -m_plus_e12_three,
+                             turned<2, 3, 4, 2>(three_w_u1), turned<3, 1, 2, 3>(m_plus_e12_three),
                              turned<3, 1, 2, 3>(three_w_u1));
       return {
           .s = S(0.5) * (plus_s + minus_s),
@@ -211,7 +211,7 @@ template <class S>
           .e2i = all_e1i[1],
           .e3i = all_e1i[2],
           .e123i = S(0.5) * mul_add(-m.e123i, w.d,
-                                    lanes::total(dot(-three_m_e1i, three_w_w23, -three_m_minus_e12,
+                                    lanes::total(dot(-three_m_e1i, three_w_w23, -m_minus_e12_three,
                                                      turned<3, 1, 2, 3>(three_w_v1)))),
           .e0i = S(-0.5) * (plus_s - minus_s),
           .e023i = all_e023i[0],
@@ -221,7 +221,7 @@ template <class S>
           .e02 = all_e01[1],
           .e03 = all_e01[2],
           .e0123 = S(0.5) * mul_add(m.e0123, w.d,
-                                    lanes::total(dot(-three_m_e01, three_w_w23, -three_m_plus_e12,
+                                    lanes::total(dot(-three_m_e01, three_w_w23, -m_plus_e12_three,
                                                      turned<3, 1, 2, 3>(three_w_u1))))};
     }
   }
@@ -301,7 +301,7 @@ template <class S>
       const auto three_m_e1i = four(m.e1i, m.e2i, m.e3i, m.e1i);
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_c_e1i =
+      const auto c_e1i_three =
           dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_v1),
               -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_v1), -four(m.e0i),
               three_w_v1, -three_m_e1i, four(w.d), turned<2, 3, 4, 2>(three_m_e1i),
@@ -309,13 +309,13 @@ template <class S>
               turned<2, 3, 4, 2>(three_w_w23));
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_w_u1 = four(w.u1, w.u2, w.u3, w.u1);
-      const auto three_c_e01 = dot(
+      const auto c_e01_three = dot(
           turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_w_u1),
           -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_w_u1), four(m.e0i), three_w_u1,
           three_m_e01, four(w.d), turned<2, 3, 4, 2>(three_m_e01), turned<3, 1, 2, 3>(three_w_w23),
           -turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_w_w23));
       const S c_e0i = lanes::total(dot(three_m_e1i, three_w_u1, -three_m_e01, three_w_v1));
-      const auto three_c_e12 =
+      const auto c_e12_three =
           dot(three_m_e23, turned<2, 3, 4, 2>(three_w_w23), -turned<2, 3, 4, 2>(three_m_e23),
               three_w_w23, three_m_e1i, turned<2, 3, 4, 2>(three_w_u1),
               -turned<2, 3, 4, 2>(three_m_e1i), three_w_u1, three_m_e01,
@@ -323,60 +323,60 @@ template <class S>
       const S c_e123i = dot(m.e023i, w.v1, m.e031i, w.v2, m.e012i, w.v3, m.e123i, w.d);
       const S c_e0123 = dot(m.e023i, w.u1, m.e031i, w.u2, m.e012i, w.u3, m.e0123, w.d);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e012i =
+      const auto c_e012i_three =
           dot(three_m_e023i, turned<2, 3, 4, 2>(three_w_w23), -turned<2, 3, 4, 2>(three_m_e023i),
               three_w_w23, four(m.e123i), turned<3, 1, 2, 3>(three_w_u1), -four(m.e0123),
               turned<3, 1, 2, 3>(three_w_v1));
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_plus_s = m.s + m.e0i;
-      const auto three_c_minus_e12 = three_c_e012i + three_c_e12;
-      const auto three_m_minus_e12 =
+      const auto c_minus_e12_three = c_e012i_three + c_e12_three;
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
       const S m_minus_s = m.s - m.e0i;
-      const auto three_c_plus_e12 = -three_c_e012i + three_c_e12;
+      const auto c_plus_e12_three = -c_e012i_three + c_e12_three;
       const auto all_w23 = mul_add(
           four(S(2)),
-          dot(-three_c_e012i, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e012i),
-              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_c_e012i), four(m.e0i),
-              -four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, three_c_e12,
-              turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(three_c_e12),
-              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(three_c_e12), four(m.s),
-              -four(c_e0i), three_m_e023i, three_c_e01, four(m.e123i),
-              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e1i),
-              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e1i), three_c_e1i,
-              four(m.e0123), -turned<2, 3, 4, 2>(three_c_e1i), turned<3, 1, 2, 3>(three_m_e01),
-              turned<3, 1, 2, 3>(three_c_e1i), turned<2, 3, 4, 2>(three_m_e01)),
+          dot(-c_e012i_three, turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(c_e012i_three),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(c_e012i_three), four(m.e0i),
+              -four(c_e0123), three_m_e1i, four(c_e123i), three_m_e01, c_e12_three,
+              turned<2, 3, 4, 2>(three_m_e23), -turned<3, 1, 2, 3>(c_e12_three),
+              turned<3, 1, 2, 3>(three_m_e23), -turned<2, 3, 4, 2>(c_e12_three), four(m.s),
+              -four(c_e0i), three_m_e023i, c_e01_three, four(m.e123i),
+              -turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e1i),
+              turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e1i), c_e1i_three,
+              four(m.e0123), -turned<2, 3, 4, 2>(c_e1i_three), turned<3, 1, 2, 3>(three_m_e01),
+              turned<3, 1, 2, 3>(c_e1i_three), turned<2, 3, 4, 2>(three_m_e01)),
           three_w_w23);
       const auto all_v1 =
           mul_add(four(S(2)),
-                  dot(three_c_minus_e12, turned<2, 3, 4, 2>(three_m_e1i),
-                      -turned<3, 1, 2, 3>(three_c_minus_e12), turned<3, 1, 2, 3>(three_m_e1i),
-                      turned<2, 3, 4, 2>(three_c_minus_e12), four(m.e123i), four(c_e123i),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), four(c_e0i), three_m_e1i, -three_c_e1i,
-                      four(m_plus_s), -turned<2, 3, 4, 2>(three_c_e1i), three_m_plus_e12,
-                      turned<3, 1, 2, 3>(three_c_e1i), turned<3, 1, 2, 3>(three_m_plus_e12)),
+                  dot(c_minus_e12_three, turned<2, 3, 4, 2>(three_m_e1i),
+                      -turned<3, 1, 2, 3>(c_minus_e12_three), turned<3, 1, 2, 3>(three_m_e1i),
+                      turned<2, 3, 4, 2>(c_minus_e12_three), four(m.e123i), four(c_e123i),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), four(c_e0i), three_m_e1i, -c_e1i_three,
+                      four(m_plus_s), -turned<2, 3, 4, 2>(c_e1i_three), m_plus_e12_three,
+                      turned<3, 1, 2, 3>(c_e1i_three), turned<3, 1, 2, 3>(m_plus_e12_three)),
                   three_w_v1);
-      const S c_e3i = three_c_e1i[2];
-      const S c_e2i = three_c_e1i[1];
-      const S c_e1i = three_c_e1i[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
-      const S c_e23 = three_c_e12[1];
-      const S c_e31 = three_c_e12[2];
-      const S c_e12 = three_c_e12[0];
-      const S c_e023i = three_c_e012i[1];
-      const S c_e031i = three_c_e012i[2];
-      const S c_e012i = three_c_e012i[0];
+      const S c_e3i = c_e1i_three[2];
+      const S c_e2i = c_e1i_three[1];
+      const S c_e1i = c_e1i_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
+      const S c_e23 = c_e12_three[1];
+      const S c_e31 = c_e12_three[2];
+      const S c_e12 = c_e12_three[0];
+      const S c_e023i = c_e012i_three[1];
+      const S c_e031i = c_e012i_three[2];
+      const S c_e012i = c_e012i_three[0];
       const auto all_u1 = mul_add(
           four(S(2)),
-          dot(three_c_plus_e12, turned<2, 3, 4, 2>(three_m_e01),
-              -turned<3, 1, 2, 3>(three_c_plus_e12), turned<3, 1, 2, 3>(three_m_e01),
-              turned<2, 3, 4, 2>(three_c_plus_e12), four(m.e0123), four(c_e0123),
-              turned<2, 3, 4, 2>(three_m_minus_e12), -four(c_e0i), three_m_e01, -three_c_e01,
-              four(m_minus_s), turned<2, 3, 4, 2>(three_c_e01), three_m_minus_e12,
-              -turned<3, 1, 2, 3>(three_c_e01), turned<3, 1, 2, 3>(three_m_minus_e12)),
+          dot(c_plus_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(c_plus_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(c_plus_e12_three), four(m.e0123), four(c_e0123),
+              turned<2, 3, 4, 2>(m_minus_e12_three), -four(c_e0i), three_m_e01, -c_e01_three,
+              four(m_minus_s), turned<2, 3, 4, 2>(c_e01_three), m_minus_e12_three,
+              -turned<3, 1, 2, 3>(c_e01_three), turned<3, 1, 2, 3>(m_minus_e12_three)),
           three_w_u1);
       return {.w23 = all_w23[0],
               .w31 = all_w23[1],
@@ -505,20 +505,20 @@ template <class S>
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
       const auto three_mu_k1 = four(mu.k1, mu.k2, mu.k3, mu.k1);
       const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
-      const auto three_c_e12i =
+      const auto c_e12i_three =
           dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_k1), -turned<2, 3, 4, 2>(three_m_e23),
               three_mu_k1, -four(m.e0i), turned<3, 1, 2, 3>(three_mu_k1), three_m_e1i,
               turned<2, 3, 4, 2>(three_mu_l23), -turned<2, 3, 4, 2>(three_m_e1i), three_mu_l23,
               turned<3, 1, 2, 3>(three_m_e1i), four(mu.q));
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
       const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
-      const auto three_c_e012 =
+      const auto c_e012_three =
           dot(three_m_e23, turned<2, 3, 4, 2>(three_mu_p1), -turned<2, 3, 4, 2>(three_m_e23),
               three_mu_p1, four(m.e0i), turned<3, 1, 2, 3>(three_mu_p1), three_m_e01,
               turned<2, 3, 4, 2>(three_mu_l23), -turned<2, 3, 4, 2>(three_m_e01), three_mu_l23,
               -turned<3, 1, 2, 3>(three_m_e01), four(mu.q));
       const S c_e123 = lanes::total(dot(three_m_e1i, three_mu_p1, -three_m_e01, three_mu_k1));
-      const auto three_c_e01i =
+      const auto c_e01i_three =
           dot(turned<2, 3, 4, 2>(three_m_e23), turned<3, 1, 2, 3>(three_mu_l23),
               -turned<3, 1, 2, 3>(three_m_e23), turned<2, 3, 4, 2>(three_mu_l23),
               turned<2, 3, 4, 2>(three_m_e1i), turned<3, 1, 2, 3>(three_mu_p1),
@@ -528,60 +528,60 @@ template <class S>
       const S c_ei = dot(m.e023i, mu.k1, m.e031i, mu.k2, m.e012i, mu.k3, -m.e123i, mu.q);
       const S c_e0 = dot(-m.e023i, mu.p1, -m.e031i, mu.p2, -m.e012i, mu.p3, m.e0123, mu.q);
       const auto three_m_e023i = four(m.e023i, m.e031i, m.e012i, m.e023i);
-      const auto three_c_e1 =
+      const auto c_e1_three =
           dot(-turned<2, 3, 4, 2>(three_m_e023i), turned<3, 1, 2, 3>(three_mu_l23),
               turned<3, 1, 2, 3>(three_m_e023i), turned<2, 3, 4, 2>(three_mu_l23), -four(m.e123i),
               three_mu_p1, four(m.e0123), three_mu_k1);
       const S m_minus_s = m.s - m.e0i;
-      const auto three_m_minus_e12 =
+      const auto m_minus_e12_three =
           -turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const auto three_c_plus_e1 = three_c_e1 + three_c_e01i;
+      const auto c_plus_e1_three = c_e1_three + c_e01i_three;
       const S m_plus_s = m.s + m.e0i;
-      const auto three_m_plus_e12 =
+      const auto m_plus_e12_three =
           turned<3, 1, 2, 3>(three_m_e23) + turned<3, 1, 2, 3>(three_m_e023i);
-      const auto three_c_minus_e1 = three_c_e1 - three_c_e01i;
+      const auto c_minus_e1_three = c_e1_three - c_e01i_three;
       const auto all_l23 = mul_add(
           four(S(2)),
-          dot(-three_c_e1, four(m.e0i), -turned<2, 3, 4, 2>(three_c_e1),
-              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(three_c_e1),
+          dot(-c_e1_three, four(m.e0i), -turned<2, 3, 4, 2>(c_e1_three),
+              turned<3, 1, 2, 3>(three_m_e023i), turned<3, 1, 2, 3>(c_e1_three),
               turned<2, 3, 4, 2>(three_m_e023i), four(c_e0), three_m_e1i, four(c_ei), three_m_e01,
-              -three_c_e01i, four(m.s), -turned<2, 3, 4, 2>(three_c_e01i),
-              turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(three_c_e01i),
-              turned<2, 3, 4, 2>(three_m_e23), -four(c_e123), three_m_e023i, three_c_e012,
-              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_e012),
-              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(three_c_e012), four(m.e123i),
-              three_c_e12i, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(three_c_e12i),
-              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(three_c_e12i), four(m.e0123)),
+              -c_e01i_three, four(m.s), -turned<2, 3, 4, 2>(c_e01i_three),
+              turned<3, 1, 2, 3>(three_m_e23), turned<3, 1, 2, 3>(c_e01i_three),
+              turned<2, 3, 4, 2>(three_m_e23), -four(c_e123), three_m_e023i, c_e012_three,
+              turned<2, 3, 4, 2>(three_m_e1i), -turned<3, 1, 2, 3>(c_e012_three),
+              turned<3, 1, 2, 3>(three_m_e1i), turned<2, 3, 4, 2>(c_e012_three), four(m.e123i),
+              c_e12i_three, turned<2, 3, 4, 2>(three_m_e01), -turned<3, 1, 2, 3>(c_e12i_three),
+              turned<3, 1, 2, 3>(three_m_e01), turned<2, 3, 4, 2>(c_e12i_three), four(m.e0123)),
           three_mu_l23);
       const auto all_p1 = mul_add(
           four(S(2)),
-          dot(three_c_plus_e1, four(m.e0123), -turned<2, 3, 4, 2>(three_c_plus_e1),
-              turned<3, 1, 2, 3>(three_m_e01), turned<3, 1, 2, 3>(three_c_plus_e1),
-              turned<2, 3, 4, 2>(three_m_e01), -four(c_e0), turned<2, 3, 4, 2>(three_m_minus_e12),
-              -four(c_e123), three_m_e01, -three_c_e012, turned<3, 1, 2, 3>(three_m_minus_e12),
-              turned<3, 1, 2, 3>(three_c_e012), three_m_minus_e12,
-              -turned<2, 3, 4, 2>(three_c_e012), four(m_minus_s)),
+          dot(c_plus_e1_three, four(m.e0123), -turned<2, 3, 4, 2>(c_plus_e1_three),
+              turned<3, 1, 2, 3>(three_m_e01), turned<3, 1, 2, 3>(c_plus_e1_three),
+              turned<2, 3, 4, 2>(three_m_e01), -four(c_e0), turned<2, 3, 4, 2>(m_minus_e12_three),
+              -four(c_e123), three_m_e01, -c_e012_three, turned<3, 1, 2, 3>(m_minus_e12_three),
+              turned<3, 1, 2, 3>(c_e012_three), m_minus_e12_three,
+              -turned<2, 3, 4, 2>(c_e012_three), four(m_minus_s)),
           three_mu_p1);
-      const S c_e23i = three_c_e12i[1];
-      const S c_e31i = three_c_e12i[2];
-      const S c_e12i = three_c_e12i[0];
-      const S c_e023 = three_c_e012[1];
-      const S c_e031 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
-      const S c_e03i = three_c_e01i[2];
-      const S c_e02i = three_c_e01i[1];
-      const S c_e01i = three_c_e01i[0];
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
+      const S c_e23i = c_e12i_three[1];
+      const S c_e31i = c_e12i_three[2];
+      const S c_e12i = c_e12i_three[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e031 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
+      const S c_e03i = c_e01i_three[2];
+      const S c_e02i = c_e01i_three[1];
+      const S c_e01i = c_e01i_three[0];
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
       const auto all_k1 =
           mul_add(four(S(2)),
-                  dot(-three_c_minus_e1, four(m.e123i), turned<2, 3, 4, 2>(three_c_minus_e1),
-                      turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(three_c_minus_e1),
+                  dot(-c_minus_e1_three, four(m.e123i), turned<2, 3, 4, 2>(c_minus_e1_three),
+                      turned<3, 1, 2, 3>(three_m_e1i), -turned<3, 1, 2, 3>(c_minus_e1_three),
                       turned<2, 3, 4, 2>(three_m_e1i), four(c_ei),
-                      turned<2, 3, 4, 2>(three_m_plus_e12), four(c_e123), three_m_e1i, three_c_e12i,
-                      turned<3, 1, 2, 3>(three_m_plus_e12), -turned<3, 1, 2, 3>(three_c_e12i),
-                      three_m_plus_e12, -turned<2, 3, 4, 2>(three_c_e12i), four(m_plus_s)),
+                      turned<2, 3, 4, 2>(m_plus_e12_three), four(c_e123), three_m_e1i, c_e12i_three,
+                      turned<3, 1, 2, 3>(m_plus_e12_three), -turned<3, 1, 2, 3>(c_e12i_three),
+                      m_plus_e12_three, -turned<2, 3, 4, 2>(c_e12i_three), four(m_plus_s)),
                   three_mu_k1);
       return {.l23 = all_l23[0],
               .l31 = all_l23[1],

@@ -664,27 +664,27 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
-      const auto three_c_e12 = dot(-turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, three_b_e23,
-                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto c_e12_three = dot(-turned<2, 3, 4, 2>(three_b_e23), twice_e23_three, three_b_e23,
+                                   turned<2, 3, 4, 2>(twice_e23_three));
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
-      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto twice_e01_three = four(S(2)) * three_m_e01;
       const auto three_b_e01 = four(b.e01, b.e02, b.e03, b.e01);
-      const auto three_c_e01 =
-          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(three_twice_e23),
-              -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e01),
-              turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e01));
-      const auto all_e23 = dot(three_b_e23, -three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
-                               turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
-                               turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto c_e01_three =
+          dot(-turned<3, 1, 2, 3>(three_b_e01), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_b_e01), turned<3, 1, 2, 3>(twice_e23_three),
+              -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(twice_e01_three),
+              turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(twice_e01_three));
+      const auto all_e23 = dot(three_b_e23, -c_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+                               turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+                               turned<2, 3, 4, 2>(c_e12_three), four(m.s));
       const auto all_e01 =
-          dot(three_b_e01, -three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
-              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
-              -turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), three_c_e01, four(m.s),
-              turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
+          dot(three_b_e01, -c_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+              turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+              -turned<2, 3, 4, 2>(c_e12_three), four(m.e0123), c_e01_three, four(m.s),
+              turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e23),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e23));
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
               .e12 = all_e23[2],

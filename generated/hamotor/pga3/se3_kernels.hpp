@@ -83,27 +83,27 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_c_e12 = dot(three_twice_e23, turned<2, 3, 4, 2>(three_w_w23),
-                                   -turned<2, 3, 4, 2>(three_twice_e23), three_w_w23);
+      const auto c_e12_three = dot(twice_e23_three, turned<2, 3, 4, 2>(three_w_w23),
+                                   -turned<2, 3, 4, 2>(twice_e23_three), three_w_w23);
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
-      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto twice_e01_three = four(S(2)) * three_m_e01;
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
-      const auto three_c_e01 =
-          dot(turned<2, 3, 4, 2>(three_twice_e23), turned<3, 1, 2, 3>(three_w_v1),
-              -turned<3, 1, 2, 3>(three_twice_e23), turned<2, 3, 4, 2>(three_w_v1),
-              turned<2, 3, 4, 2>(three_twice_e01), turned<3, 1, 2, 3>(three_w_w23),
-              -turned<3, 1, 2, 3>(three_twice_e01), turned<2, 3, 4, 2>(three_w_w23));
-      const auto all_w23 = dot(three_w_w23, three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
-                               -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
-                               -turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+      const auto c_e01_three =
+          dot(turned<2, 3, 4, 2>(twice_e23_three), turned<3, 1, 2, 3>(three_w_v1),
+              -turned<3, 1, 2, 3>(twice_e23_three), turned<2, 3, 4, 2>(three_w_v1),
+              turned<2, 3, 4, 2>(twice_e01_three), turned<3, 1, 2, 3>(three_w_w23),
+              -turned<3, 1, 2, 3>(twice_e01_three), turned<2, 3, 4, 2>(three_w_w23));
+      const auto all_w23 = dot(three_w_w23, c_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+                               -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+                               -turned<2, 3, 4, 2>(c_e12_three), four(m.s));
       const auto all_v1 =
-          dot(three_w_v1, three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
-              turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), -three_c_e01, four(m.s),
-              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
-              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
+          dot(three_w_v1, c_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(c_e12_three), four(m.e0123), -c_e01_three, four(m.s),
+              -turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e23));
       return {.w23 = all_w23[0],
               .w31 = all_w23[1],
               .w12 = all_w23[2],
@@ -147,27 +147,27 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_m_e01 = four(m.e01, m.e02, m.e03, m.e01);
-      const auto three_twice_e01 = four(S(2)) * three_m_e01;
+      const auto twice_e01_three = four(S(2)) * three_m_e01;
       const auto three_m_e23 = four(m.e23, m.e31, m.e12, m.e23);
-      const auto three_twice_e23 = four(S(2)) * three_m_e23;
+      const auto twice_e23_three = four(S(2)) * three_m_e23;
       const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
       const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
-      const auto three_c_e01 =
-          dot(turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_twice_e23),
-              -turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_twice_e23),
-              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_twice_e01),
-              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_twice_e01));
-      const auto three_c_e12 = dot(turned<2, 3, 4, 2>(three_mu_p1), three_twice_e23, -three_mu_p1,
-                                   turned<2, 3, 4, 2>(three_twice_e23));
+      const auto c_e01_three =
+          dot(turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(twice_e23_three),
+              -turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(twice_e23_three),
+              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(twice_e01_three),
+              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(twice_e01_three));
+      const auto c_e12_three = dot(turned<2, 3, 4, 2>(three_mu_p1), twice_e23_three, -three_mu_p1,
+                                   turned<2, 3, 4, 2>(twice_e23_three));
       const auto all_l23 =
-          dot(three_mu_l23, three_c_e12, turned<2, 3, 4, 2>(three_m_e01),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e01),
-              turned<2, 3, 4, 2>(three_c_e12), four(m.e0123), -three_c_e01, four(m.s),
-              -turned<2, 3, 4, 2>(three_c_e01), turned<3, 1, 2, 3>(three_m_e23),
-              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_m_e23));
-      const auto all_p1 = dot(three_mu_p1, three_c_e12, turned<2, 3, 4, 2>(three_m_e23),
-                              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_m_e23),
-                              -turned<2, 3, 4, 2>(three_c_e12), four(m.s));
+          dot(three_mu_l23, c_e12_three, turned<2, 3, 4, 2>(three_m_e01),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e01),
+              turned<2, 3, 4, 2>(c_e12_three), four(m.e0123), -c_e01_three, four(m.s),
+              -turned<2, 3, 4, 2>(c_e01_three), turned<3, 1, 2, 3>(three_m_e23),
+              turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_m_e23));
+      const auto all_p1 = dot(three_mu_p1, c_e12_three, turned<2, 3, 4, 2>(three_m_e23),
+                              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_m_e23),
+                              -turned<2, 3, 4, 2>(c_e12_three), four(m.s));
       return {.l23 = all_l23[0],
               .l31 = all_l23[1],
               .l12 = all_l23[2],

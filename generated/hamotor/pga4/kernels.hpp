@@ -421,30 +421,30 @@ template <class S>
       const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
       const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
       const auto three_x_e2034 = four(x.e2034, x.e0134, x.e1024, x.e2034);
-      const auto three_c_e0124 =
+      const auto c_e0124_three =
           dot(-turned<3, 1, 2, 3>(three_m_e12), three_x_e2034, turned<2, 3, 4, 2>(three_m_e12),
               turned<2, 3, 4, 2>(three_x_e2034), -turned<3, 1, 2, 3>(three_m_e14), four(x.e0123)) +
           turned<3, 1, 2, 3>(three_m_e01);
       const S c_e0123 = dot(m.e14, x.e2034, m.e24, x.e0134, m.e34, x.e1024) + m.e04;
       const S c_e04 = mul_add(m.e1234, x.e0123, -m.e0123);
       const auto three_m_e0124 = four(m.e0124, m.e0234, -m.e0134, m.e0124);
-      const auto three_c_e01 =
+      const auto c_e01_three =
           mul_add(four(m.e1234), three_x_e2034, turned<2, 3, 4, 2>(three_m_e0124));
       const auto all_e2034 =
           mul_add(four(S(2)),
-                  dot(-three_c_e01, four(m.e1234), turned<2, 3, 4, 2>(three_c_e01),
-                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                  dot(-c_e01_three, four(m.e1234), turned<2, 3, 4, 2>(c_e01_three),
+                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(c_e01_three),
                       turned<2, 3, 4, 2>(three_m_e14), four(c_e04), turned<2, 3, 4, 2>(three_m_e12),
-                      -four(c_e0123), three_m_e14, three_c_e0124, turned<3, 1, 2, 3>(three_m_e12),
-                      -turned<3, 1, 2, 3>(three_c_e0124), three_m_e12,
-                      -turned<2, 3, 4, 2>(three_c_e0124), four(m.s)),
+                      -four(c_e0123), three_m_e14, c_e0124_three, turned<3, 1, 2, 3>(three_m_e12),
+                      -turned<3, 1, 2, 3>(c_e0124_three), three_m_e12,
+                      -turned<2, 3, 4, 2>(c_e0124_three), four(m.s)),
                   three_x_e2034);
-      const S c_e0234 = three_c_e0124[1];
-      const S c_e0314 = three_c_e0124[2];
-      const S c_e0124 = three_c_e0124[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
+      const S c_e0234 = c_e0124_three[1];
+      const S c_e0314 = c_e0124_three[2];
+      const S c_e0124 = c_e0124_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
       return {.e2034 = all_e2034[0],
               .e0134 = all_e2034[1],
               .e1024 = all_e2034[2],
@@ -511,27 +511,27 @@ template <class S>
       const auto three_d_e2034 = four(d.e2034, d.e0134, d.e1024, d.e2034);
       const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
       const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
-      const auto three_c_e0124 =
+      const auto c_e0124_three =
           dot(-three_d_e2034, turned<3, 1, 2, 3>(three_m_e12), turned<2, 3, 4, 2>(three_d_e2034),
               turned<2, 3, 4, 2>(three_m_e12), -four(d.e0123), turned<3, 1, 2, 3>(three_m_e14));
       const S c_e0123 = dot(d.e2034, m.e14, d.e0134, m.e24, d.e1024, m.e34);
       const S c_e04 = d.e0123 * m.e1234;
-      const auto three_c_e01 = three_d_e2034 * four(m.e1234);
+      const auto c_e01_three = three_d_e2034 * four(m.e1234);
       const auto all_e2034 =
           mul_add(four(S(2)),
-                  dot(-three_c_e01, four(m.e1234), turned<2, 3, 4, 2>(three_c_e01),
-                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                  dot(-c_e01_three, four(m.e1234), turned<2, 3, 4, 2>(c_e01_three),
+                      turned<3, 1, 2, 3>(three_m_e14), -turned<3, 1, 2, 3>(c_e01_three),
                       turned<2, 3, 4, 2>(three_m_e14), four(c_e04), turned<2, 3, 4, 2>(three_m_e12),
-                      -four(c_e0123), three_m_e14, three_c_e0124, turned<3, 1, 2, 3>(three_m_e12),
-                      -turned<3, 1, 2, 3>(three_c_e0124), three_m_e12,
-                      -turned<2, 3, 4, 2>(three_c_e0124), four(m.s)),
+                      -four(c_e0123), three_m_e14, c_e0124_three, turned<3, 1, 2, 3>(three_m_e12),
+                      -turned<3, 1, 2, 3>(c_e0124_three), three_m_e12,
+                      -turned<2, 3, 4, 2>(c_e0124_three), four(m.s)),
                   three_d_e2034);
-      const S c_e0234 = three_c_e0124[1];
-      const S c_e0314 = three_c_e0124[2];
-      const S c_e0124 = three_c_e0124[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
+      const S c_e0234 = c_e0124_three[1];
+      const S c_e0314 = c_e0124_three[2];
+      const S c_e0124 = c_e0124_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
       return {.e2034 = all_e2034[0],
               .e0134 = all_e2034[1],
               .e1024 = all_e2034[2],
@@ -581,25 +581,25 @@ template <class S>
       const auto three_m_e12 = four(m.e12, m.e23, -m.e13, m.e12);
       const auto three_m_e14 = four(m.e14, m.e24, m.e34, m.e14);
       const auto three_p_e1 = four(p.e1, p.e2, p.e3, p.e1);
-      const auto three_y_e124 = dot(-turned<2, 3, 4, 2>(three_m_e14), three_p_e1, three_m_e14,
+      const auto y_e124_three = dot(-turned<2, 3, 4, 2>(three_m_e14), three_p_e1, three_m_e14,
                                     turned<2, 3, 4, 2>(three_p_e1), four(m.e1234),
                                     turned<3, 1, 2, 3>(three_p_e1), -three_m_e12, four(p.e4));
       const S y_e123 = dot(-m.e23, p.e1, m.e13, p.e2, -m.e12, p.e3, -m.e1234, p.e4);
       const S y_e4 = dot(-m.e14, p.e1, -m.e24, p.e2, -m.e34, p.e3, m.s, p.e4);
-      const auto three_y_e1 = dot(four(m.s), three_p_e1, three_m_e12,
+      const auto y_e1_three = dot(four(m.s), three_p_e1, three_m_e12,
                                   turned<2, 3, 4, 2>(three_p_e1), -turned<3, 1, 2, 3>(three_m_e12),
                                   turned<3, 1, 2, 3>(three_p_e1), three_m_e14, four(p.e4));
-      const S y_e234 = three_y_e124[1];
-      const S y_e314 = three_y_e124[2];
-      const S y_e124 = three_y_e124[0];
-      const S y_e3 = three_y_e1[2];
-      const S y_e2 = three_y_e1[1];
-      const S y_e1 = three_y_e1[0];
+      const S y_e234 = y_e124_three[1];
+      const S y_e314 = y_e124_three[2];
+      const S y_e124 = y_e124_three[0];
+      const S y_e3 = y_e1_three[2];
+      const S y_e2 = y_e1_three[1];
+      const S y_e1 = y_e1_three[0];
       const auto all_e1 =
           mul_add(four(S(2)),
-                  dot(three_m_e12, turned<2, 3, 4, 2>(three_y_e1), -turned<3, 1, 2, 3>(three_m_e12),
-                      turned<3, 1, 2, 3>(three_y_e1), three_m_e14, four(y_e4), -four(m.e1234),
-                      turned<2, 3, 4, 2>(three_y_e124)),
+                  dot(three_m_e12, turned<2, 3, 4, 2>(y_e1_three), -turned<3, 1, 2, 3>(three_m_e12),
+                      turned<3, 1, 2, 3>(y_e1_three), three_m_e14, four(y_e4), -four(m.e1234),
+                      turned<2, 3, 4, 2>(y_e124_three)),
                   three_p_e1);
       return {.e0 = mul_add(S(2),
                             dot(m.e01, y_e1, m.e02, y_e2, m.e03, y_e3, m.e04, y_e4, -m.e0123,
@@ -798,27 +798,27 @@ template <class S>
       const auto three_r_e12 = four(r.e12, r.e23, -r.e13, r.e12);
       const auto three_r_e14 = four(r.e14, r.e24, r.e34, r.e14);
       const auto three_x_e2034 = four(x.e2034, x.e0134, x.e1024, x.e2034);
-      const auto three_c_e0124 =
+      const auto c_e0124_three =
           dot(-turned<3, 1, 2, 3>(three_r_e12), three_x_e2034, turned<2, 3, 4, 2>(three_r_e12),
               turned<2, 3, 4, 2>(three_x_e2034), -turned<3, 1, 2, 3>(three_r_e14), four(x.e0123));
       const S c_e0123 = dot(r.e14, x.e2034, r.e24, x.e0134, r.e34, x.e1024);
       const S c_e04 = r.e1234 * x.e0123;
-      const auto three_c_e01 = four(r.e1234) * three_x_e2034;
+      const auto c_e01_three = four(r.e1234) * three_x_e2034;
       const auto all_e2034 =
           mul_add(four(S(2)),
-                  dot(-three_c_e01, four(r.e1234), turned<2, 3, 4, 2>(three_c_e01),
-                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                  dot(-c_e01_three, four(r.e1234), turned<2, 3, 4, 2>(c_e01_three),
+                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(c_e01_three),
                       turned<2, 3, 4, 2>(three_r_e14), four(c_e04), turned<2, 3, 4, 2>(three_r_e12),
-                      -four(c_e0123), three_r_e14, three_c_e0124, turned<3, 1, 2, 3>(three_r_e12),
-                      -turned<3, 1, 2, 3>(three_c_e0124), three_r_e12,
-                      -turned<2, 3, 4, 2>(three_c_e0124), four(r.s)),
+                      -four(c_e0123), three_r_e14, c_e0124_three, turned<3, 1, 2, 3>(three_r_e12),
+                      -turned<3, 1, 2, 3>(c_e0124_three), three_r_e12,
+                      -turned<2, 3, 4, 2>(c_e0124_three), four(r.s)),
                   three_x_e2034);
-      const S c_e0234 = three_c_e0124[1];
-      const S c_e0314 = three_c_e0124[2];
-      const S c_e0124 = three_c_e0124[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
+      const S c_e0234 = c_e0124_three[1];
+      const S c_e0314 = c_e0124_three[2];
+      const S c_e0124 = c_e0124_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
       return {.e2034 = all_e2034[0],
               .e0134 = all_e2034[1],
               .e1024 = all_e2034[2],
@@ -868,27 +868,27 @@ template <class S>
       const auto three_d_e2034 = four(d.e2034, d.e0134, d.e1024, d.e2034);
       const auto three_r_e12 = four(r.e12, r.e23, -r.e13, r.e12);
       const auto three_r_e14 = four(r.e14, r.e24, r.e34, r.e14);
-      const auto three_c_e0124 =
+      const auto c_e0124_three =
           dot(-three_d_e2034, turned<3, 1, 2, 3>(three_r_e12), turned<2, 3, 4, 2>(three_d_e2034),
               turned<2, 3, 4, 2>(three_r_e12), -four(d.e0123), turned<3, 1, 2, 3>(three_r_e14));
       const S c_e0123 = dot(d.e2034, r.e14, d.e0134, r.e24, d.e1024, r.e34);
       const S c_e04 = d.e0123 * r.e1234;
-      const auto three_c_e01 = three_d_e2034 * four(r.e1234);
+      const auto c_e01_three = three_d_e2034 * four(r.e1234);
       const auto all_e2034 =
           mul_add(four(S(2)),
-                  dot(-three_c_e01, four(r.e1234), turned<2, 3, 4, 2>(three_c_e01),
-                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(three_c_e01),
+                  dot(-c_e01_three, four(r.e1234), turned<2, 3, 4, 2>(c_e01_three),
+                      turned<3, 1, 2, 3>(three_r_e14), -turned<3, 1, 2, 3>(c_e01_three),
                       turned<2, 3, 4, 2>(three_r_e14), four(c_e04), turned<2, 3, 4, 2>(three_r_e12),
-                      -four(c_e0123), three_r_e14, three_c_e0124, turned<3, 1, 2, 3>(three_r_e12),
-                      -turned<3, 1, 2, 3>(three_c_e0124), three_r_e12,
-                      -turned<2, 3, 4, 2>(three_c_e0124), four(r.s)),
+                      -four(c_e0123), three_r_e14, c_e0124_three, turned<3, 1, 2, 3>(three_r_e12),
+                      -turned<3, 1, 2, 3>(c_e0124_three), three_r_e12,
+                      -turned<2, 3, 4, 2>(c_e0124_three), four(r.s)),
                   three_d_e2034);
-      const S c_e0234 = three_c_e0124[1];
-      const S c_e0314 = three_c_e0124[2];
-      const S c_e0124 = three_c_e0124[0];
-      const S c_e03 = three_c_e01[2];
-      const S c_e02 = three_c_e01[1];
-      const S c_e01 = three_c_e01[0];
+      const S c_e0234 = c_e0124_three[1];
+      const S c_e0314 = c_e0124_three[2];
+      const S c_e0124 = c_e0124_three[0];
+      const S c_e03 = c_e01_three[2];
+      const S c_e02 = c_e01_three[1];
+      const S c_e01 = c_e01_three[0];
       return {.e2034 = all_e2034[0],
               .e0134 = all_e2034[1],
               .e1024 = all_e2034[2],

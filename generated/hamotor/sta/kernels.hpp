@@ -352,25 +352,25 @@ template <class S>
       const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
       const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
       const auto three_v_e1 = four(v.e1, v.e2, v.e3, v.e1);
-      const auto three_c_e1 = dot(turned<2, 3, 4, 2>(three_r_e23), turned<3, 1, 2, 3>(three_v_e1),
+      const auto c_e1_three = dot(turned<2, 3, 4, 2>(three_r_e23), turned<3, 1, 2, 3>(three_v_e1),
                                   -turned<3, 1, 2, 3>(three_r_e23), turned<2, 3, 4, 2>(three_v_e1),
                                   three_r_e10, four(v.e0));
       const S c_e0 = dot(r.e10, v.e1, r.e20, v.e2, r.e30, v.e3);
       const S c_e123 = r.e0123 * v.e0;
-      const auto three_c_e012 = four(r.e0123) * turned<3, 1, 2, 3>(three_v_e1);
-      const S c_e3 = three_c_e1[2];
-      const S c_e2 = three_c_e1[1];
-      const S c_e1 = three_c_e1[0];
-      const S c_e023 = three_c_e012[1];
-      const S c_e013 = three_c_e012[2];
-      const S c_e012 = three_c_e012[0];
+      const auto c_e012_three = four(r.e0123) * turned<3, 1, 2, 3>(three_v_e1);
+      const S c_e3 = c_e1_three[2];
+      const S c_e2 = c_e1_three[1];
+      const S c_e1 = c_e1_three[0];
+      const S c_e023 = c_e012_three[1];
+      const S c_e013 = c_e012_three[2];
+      const S c_e012 = c_e012_three[0];
       const auto all_e1 = mul_add(
           four(S(2)),
-          dot(three_c_e012, turned<2, 3, 4, 2>(three_r_e10), -turned<3, 1, 2, 3>(three_c_e012),
-              turned<3, 1, 2, 3>(three_r_e10), turned<2, 3, 4, 2>(three_c_e012), four(r.e0123),
-              -four(c_e123), three_r_e23, four(c_e0), three_r_e10, three_c_e1, four(r.s),
-              -turned<2, 3, 4, 2>(three_c_e1), turned<3, 1, 2, 3>(three_r_e23),
-              turned<3, 1, 2, 3>(three_c_e1), turned<2, 3, 4, 2>(three_r_e23)),
+          dot(c_e012_three, turned<2, 3, 4, 2>(three_r_e10), -turned<3, 1, 2, 3>(c_e012_three),
+              turned<3, 1, 2, 3>(three_r_e10), turned<2, 3, 4, 2>(c_e012_three), four(r.e0123),
+              -four(c_e123), three_r_e23, four(c_e0), three_r_e10, c_e1_three, four(r.s),
+              -turned<2, 3, 4, 2>(c_e1_three), turned<3, 1, 2, 3>(three_r_e23),
+              turned<3, 1, 2, 3>(c_e1_three), turned<2, 3, 4, 2>(three_r_e23)),
           three_v_e1);
       return {.e0 = mul_add(S(2),
                             dot(-c_e012, r.e12, -c_e013, r.e31, -c_e023, r.e23, c_e123, r.e0123,
@@ -419,32 +419,32 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
-      const auto three_twice_e10 = four(S(2)) * three_r_e10;
+      const auto twice_e10_three = four(S(2)) * three_r_e10;
       const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
-      const auto three_twice_e23 = four(S(2)) * three_r_e23;
+      const auto twice_e23_three = four(S(2)) * three_r_e23;
       const auto three_b_e10 = four(b.e10, b.e20, b.e30, b.e10);
       const auto three_b_e23 = four(b.e23, b.e31, b.e12, b.e23);
-      const auto three_c_e12 =
-          dot(turned<2, 3, 4, 2>(three_b_e23), three_twice_e23, -three_b_e23,
-              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_b_e10),
-              three_twice_e10, three_b_e10, turned<2, 3, 4, 2>(three_twice_e10));
-      const auto three_c_e01 =
-          dot(-turned<3, 1, 2, 3>(three_b_e10), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_b_e10), turned<3, 1, 2, 3>(three_twice_e23),
-              -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(three_twice_e10),
-              turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(three_twice_e10));
+      const auto c_e12_three =
+          dot(turned<2, 3, 4, 2>(three_b_e23), twice_e23_three, -three_b_e23,
+              turned<2, 3, 4, 2>(twice_e23_three), -turned<2, 3, 4, 2>(three_b_e10),
+              twice_e10_three, three_b_e10, turned<2, 3, 4, 2>(twice_e10_three));
+      const auto c_e01_three =
+          dot(-turned<3, 1, 2, 3>(three_b_e10), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_b_e10), turned<3, 1, 2, 3>(twice_e23_three),
+              -turned<3, 1, 2, 3>(three_b_e23), turned<2, 3, 4, 2>(twice_e10_three),
+              turned<2, 3, 4, 2>(three_b_e23), turned<3, 1, 2, 3>(twice_e10_three));
       const auto all_e23 =
-          dot(three_b_e23, three_c_e01, four(r.e0123), -turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e10), three_c_e12, turned<2, 3, 4, 2>(three_r_e23),
-              turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e10),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e23),
-              turned<2, 3, 4, 2>(three_c_e12), four(r.s));
+          dot(three_b_e23, c_e01_three, four(r.e0123), -turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e10), c_e12_three, turned<2, 3, 4, 2>(three_r_e23),
+              turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e23),
+              turned<2, 3, 4, 2>(c_e12_three), four(r.s));
       const auto all_e10 =
-          dot(three_b_e10, -three_c_e01, four(r.s), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e23), three_c_e12, turned<2, 3, 4, 2>(three_r_e10),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e23),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e10),
-              turned<2, 3, 4, 2>(three_c_e12), four(r.e0123));
+          dot(three_b_e10, -c_e01_three, four(r.s), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e23), c_e12_three, turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e10),
+              turned<2, 3, 4, 2>(c_e12_three), four(r.e0123));
       return {.e23 = all_e23[0],
               .e31 = all_e23[1],
               .e12 = all_e23[2],

@@ -58,29 +58,29 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
-      const auto three_half_v1 = four(S(0.5)) * three_w_v1;
+      const auto half_v1_three = four(S(0.5)) * three_w_v1;
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_half_w23 = four(S(0.5)) * three_w_w23;
+      const auto half_w23_three = four(S(0.5)) * three_w_w23;
       const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
       const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
-      const auto all_e23 = dot(-three_half_w23, four(r.s), -turned<3, 1, 2, 3>(three_half_w23),
-                               turned<2, 3, 4, 2>(three_r_e23), turned<2, 3, 4, 2>(three_half_w23),
-                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(three_half_v1),
-                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(three_half_v1),
-                               turned<3, 1, 2, 3>(three_r_e10), -three_half_v1, four(r.e0123));
-      const auto all_e10 = dot(three_half_v1, four(r.s), turned<3, 1, 2, 3>(three_half_v1),
-                               turned<2, 3, 4, 2>(three_r_e23), -turned<2, 3, 4, 2>(three_half_v1),
-                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(three_half_w23),
-                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(three_half_w23),
-                               turned<3, 1, 2, 3>(three_r_e10), -three_half_w23, four(r.e0123));
-      return {.s = lanes::total(dot(three_half_w23, three_r_e23, three_half_v1, three_r_e10)),
+      const auto all_e23 = dot(-half_w23_three, four(r.s), -turned<3, 1, 2, 3>(half_w23_three),
+                               turned<2, 3, 4, 2>(three_r_e23), turned<2, 3, 4, 2>(half_w23_three),
+                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(half_v1_three),
+                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(half_v1_three),
+                               turned<3, 1, 2, 3>(three_r_e10), -half_v1_three, four(r.e0123));
+      const auto all_e10 = dot(half_v1_three, four(r.s), turned<3, 1, 2, 3>(half_v1_three),
+                               turned<2, 3, 4, 2>(three_r_e23), -turned<2, 3, 4, 2>(half_v1_three),
+                               turned<3, 1, 2, 3>(three_r_e23), -turned<3, 1, 2, 3>(half_w23_three),
+                               turned<2, 3, 4, 2>(three_r_e10), turned<2, 3, 4, 2>(half_w23_three),
+                               turned<3, 1, 2, 3>(three_r_e10), -half_w23_three, four(r.e0123));
+      return {.s = lanes::total(dot(half_w23_three, three_r_e23, half_v1_three, three_r_e10)),
               .e23 = all_e23[0],
               .e31 = all_e23[1],
               .e12 = all_e23[2],
               .e10 = all_e10[0],
               .e20 = all_e10[1],
               .e30 = all_e10[2],
-              .e0123 = lanes::total(dot(-three_half_v1, three_r_e23, three_half_w23, three_r_e10))};
+              .e0123 = lanes::total(dot(-half_v1_three, three_r_e23, half_w23_three, three_r_e10))};
     }
   }
   const S half_v1 = S(0.5) * w.v1;
@@ -119,32 +119,32 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
-      const auto three_twice_e10 = four(S(2)) * three_r_e10;
+      const auto twice_e10_three = four(S(2)) * three_r_e10;
       const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
-      const auto three_twice_e23 = four(S(2)) * three_r_e23;
+      const auto twice_e23_three = four(S(2)) * three_r_e23;
       const auto three_w_v1 = four(w.v1, w.v2, w.v3, w.v1);
       const auto three_w_w23 = four(w.w23, w.w31, w.w12, w.w23);
-      const auto three_c_e12 =
-          dot(-three_twice_e23, turned<2, 3, 4, 2>(three_w_w23),
-              turned<2, 3, 4, 2>(three_twice_e23), three_w_w23, -three_twice_e10,
-              turned<2, 3, 4, 2>(three_w_v1), turned<2, 3, 4, 2>(three_twice_e10), three_w_v1);
-      const auto three_c_e01 =
-          dot(-turned<2, 3, 4, 2>(three_twice_e23), turned<3, 1, 2, 3>(three_w_v1),
-              turned<3, 1, 2, 3>(three_twice_e23), turned<2, 3, 4, 2>(three_w_v1),
-              turned<2, 3, 4, 2>(three_twice_e10), turned<3, 1, 2, 3>(three_w_w23),
-              -turned<3, 1, 2, 3>(three_twice_e10), turned<2, 3, 4, 2>(three_w_w23));
+      const auto c_e12_three =
+          dot(-twice_e23_three, turned<2, 3, 4, 2>(three_w_w23),
+              turned<2, 3, 4, 2>(twice_e23_three), three_w_w23, -twice_e10_three,
+              turned<2, 3, 4, 2>(three_w_v1), turned<2, 3, 4, 2>(twice_e10_three), three_w_v1);
+      const auto c_e01_three =
+          dot(-turned<2, 3, 4, 2>(twice_e23_three), turned<3, 1, 2, 3>(three_w_v1),
+              turned<3, 1, 2, 3>(twice_e23_three), turned<2, 3, 4, 2>(three_w_v1),
+              turned<2, 3, 4, 2>(twice_e10_three), turned<3, 1, 2, 3>(three_w_w23),
+              -turned<3, 1, 2, 3>(twice_e10_three), turned<2, 3, 4, 2>(three_w_w23));
       const auto all_w23 =
-          dot(three_w_w23, -three_c_e01, four(r.e0123), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e10), -three_c_e12, turned<2, 3, 4, 2>(three_r_e23),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e10),
-              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e23),
-              -turned<2, 3, 4, 2>(three_c_e12), four(r.s));
+          dot(three_w_w23, -c_e01_three, four(r.e0123), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e10), -c_e12_three, turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e10),
+              turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e23),
+              -turned<2, 3, 4, 2>(c_e12_three), four(r.s));
       const auto all_v1 =
-          dot(three_w_v1, -three_c_e01, four(r.s), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e23), three_c_e12, turned<2, 3, 4, 2>(three_r_e10),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e23),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e10),
-              turned<2, 3, 4, 2>(three_c_e12), four(r.e0123));
+          dot(three_w_v1, -c_e01_three, four(r.s), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e23), c_e12_three, turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e10),
+              turned<2, 3, 4, 2>(c_e12_three), four(r.e0123));
       return {.w23 = all_w23[0],
               .w31 = all_w23[1],
               .w12 = all_w23[2],
@@ -191,32 +191,32 @@ template <class S>
       using lanes::four;
       using lanes::turned;
       const auto three_r_e10 = four(r.e10, r.e20, r.e30, r.e10);
-      const auto three_twice_e10 = four(S(2)) * three_r_e10;
+      const auto twice_e10_three = four(S(2)) * three_r_e10;
       const auto three_r_e23 = four(r.e23, r.e31, r.e12, r.e23);
-      const auto three_twice_e23 = four(S(2)) * three_r_e23;
+      const auto twice_e23_three = four(S(2)) * three_r_e23;
       const auto three_mu_l23 = four(mu.l23, mu.l31, mu.l12, mu.l23);
       const auto three_mu_p1 = four(mu.p1, mu.p2, mu.p3, mu.p1);
-      const auto three_c_e12 =
-          dot(-turned<2, 3, 4, 2>(three_mu_p1), three_twice_e23, three_mu_p1,
-              turned<2, 3, 4, 2>(three_twice_e23), -turned<2, 3, 4, 2>(three_mu_l23),
-              three_twice_e10, three_mu_l23, turned<2, 3, 4, 2>(three_twice_e10));
-      const auto three_c_e01 =
-          dot(-turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(three_twice_e23),
-              turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(three_twice_e23),
-              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(three_twice_e10),
-              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(three_twice_e10));
+      const auto c_e12_three =
+          dot(-turned<2, 3, 4, 2>(three_mu_p1), twice_e23_three, three_mu_p1,
+              turned<2, 3, 4, 2>(twice_e23_three), -turned<2, 3, 4, 2>(three_mu_l23),
+              twice_e10_three, three_mu_l23, turned<2, 3, 4, 2>(twice_e10_three));
+      const auto c_e01_three =
+          dot(-turned<3, 1, 2, 3>(three_mu_l23), turned<2, 3, 4, 2>(twice_e23_three),
+              turned<2, 3, 4, 2>(three_mu_l23), turned<3, 1, 2, 3>(twice_e23_three),
+              turned<3, 1, 2, 3>(three_mu_p1), turned<2, 3, 4, 2>(twice_e10_three),
+              -turned<2, 3, 4, 2>(three_mu_p1), turned<3, 1, 2, 3>(twice_e10_three));
       const auto all_l23 =
-          dot(three_mu_l23, -three_c_e01, four(r.s), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e23), three_c_e12, turned<2, 3, 4, 2>(three_r_e10),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e23),
-              -turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e10),
-              turned<2, 3, 4, 2>(three_c_e12), four(r.e0123));
+          dot(three_mu_l23, -c_e01_three, four(r.s), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e23), c_e12_three, turned<2, 3, 4, 2>(three_r_e10),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e10),
+              turned<2, 3, 4, 2>(c_e12_three), four(r.e0123));
       const auto all_p1 =
-          dot(three_mu_p1, -three_c_e01, four(r.e0123), turned<2, 3, 4, 2>(three_c_e01),
-              turned<3, 1, 2, 3>(three_r_e10), -three_c_e12, turned<2, 3, 4, 2>(three_r_e23),
-              -turned<3, 1, 2, 3>(three_c_e01), turned<2, 3, 4, 2>(three_r_e10),
-              turned<3, 1, 2, 3>(three_c_e12), turned<3, 1, 2, 3>(three_r_e23),
-              -turned<2, 3, 4, 2>(three_c_e12), four(r.s));
+          dot(three_mu_p1, -c_e01_three, four(r.e0123), turned<2, 3, 4, 2>(c_e01_three),
+              turned<3, 1, 2, 3>(three_r_e10), -c_e12_three, turned<2, 3, 4, 2>(three_r_e23),
+              -turned<3, 1, 2, 3>(c_e01_three), turned<2, 3, 4, 2>(three_r_e10),
+              turned<3, 1, 2, 3>(c_e12_three), turned<3, 1, 2, 3>(three_r_e23),
+              -turned<2, 3, 4, 2>(c_e12_three), four(r.s));
       return {.l23 = all_l23[0],
               .l31 = all_l23[1],
               .l12 = all_l23[2],

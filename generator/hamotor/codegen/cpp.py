@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Context, Decimal
 
 from hamotor.codegen.algebra import Rational
@@ -184,14 +185,17 @@ def binding_lines(program: Program) -> list[str]:
 
 def body_lines(program: Program) -> list[str]:
     """Statements of the function body, unformatted."""
-    lines = binding_lines(program)
+    texts = {name: expression_text(e) for name, e in program.outputs}
+    return [*binding_lines(program), return_line(program, texts)]
+
+
+def return_line(program: Program, texts: Mapping[str, str]) -> str:
+    """The statement that returns the result; texts: C++ text of each of its components."""
     if program.result is None or program.result.name == "Scalar":
-        ((_, expression),) = program.outputs
-        lines.append(f"return {expression_text(expression)};")
-        return lines
-    fields = ", ".join(f".{name} = {expression_text(e)}" for name, e in program.outputs)
-    lines.append(f"return {{{fields}}};")
-    return lines
+        (text,) = texts.values()
+        return f"return {text};"
+    fields = ", ".join(f".{name} = {texts[name]}" for name, _ in program.outputs)
+    return f"return {{{fields}}};"
 
 
 def shortcut_lines(shortcut: Shortcut, general: Program) -> list[str]:

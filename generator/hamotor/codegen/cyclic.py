@@ -87,7 +87,7 @@ def cyclic_program(algebra: Algebra, program: Program) -> tuple[Program, Turn] |
         try:
             return _turned(algebra, permutation, program, names)
         except _Fails:
-            return None  # all others would fail for the same reason, each after as long
+            return None  # others would rarely do better, and each takes as long
     return None
 
 
@@ -146,7 +146,8 @@ def _degrees(program: Program) -> dict[str, int]:
     degrees: dict[str, int] = {}
     for name, x in program.bindings:
         degrees[name] = max(
-            sum(degrees.get(factor, 1) for factor in monomial) for monomial in _polynomial(x)
+            (sum(degrees.get(factor, 1) for factor in monomial) for monomial in _polynomial(x)),
+            default=0,
         )
     return degrees
 

@@ -57,9 +57,10 @@ def packed_body(kernel: Kernel) -> list[str]:
     """What a kernel of many operations does first, where the scalar and the processor allow it."""
     if kernel.shortcut is not None:
         return []
-    packed = _fours(kernel.program)
     where = PACKED
-    if kernel.turn is not None:
+    if kernel.turn is None:
+        packed = _fours(kernel.program)
+    else:
         packed = threes_lines(kernel.program, kernel.turn)
         if kernel.program.cost.total <= INLINED_OPERATIONS:
             where += " && !lanes::loops_become_lanes"
@@ -143,12 +144,11 @@ def _returned(program: Program, place: Mapping[str, tuple[str, int]]) -> list[st
         for name, (where, lane) in place.items()
         if name not in outputs
     ]
-    listed = []
+    texts = {}
     for name, expression in program.outputs:
         where, lane = place.get(name, ("", 0))
-        text = f"{where}[{lane}]" if where else cpp.expression_text(expression)
-        listed.append(f".{name} = {text}")
-    return [*lines, f"return {{{', '.join(listed)}}};"]
+        texts[name] = f"{where}[{lane}]" if where else cpp.expression_text(expression)
+    return [*lines, cpp.return_line(program, texts)]
 
 
 def _block(
@@ -270,8 +270,7 @@ def threes_lines(program: Program, turn: Turn) -> list[str]:
             text = threes.vector(x)
             threes.lines.append(f"const auto all_{name} = {text};")
             fields |= {n: f"all_{name}[{lane}]" for lane, (_, n) in enumerate(three)}
-    listed = ", ".join(f".{name} = {fields[name]}" for name, _ in program.outputs)
-    return [*threes.lines, f"return {{{listed}}};"]
+    return [*threes.lines, cpp.return_line(program, fields)]
 
 
 class _Threes:
@@ -285,7 +284,7 @@ class _Threes:
     def bind(self, three: Three, x: Expression) -> None:
         """A binding of three names."""
         text = self.vector(x)
-        register = f"three_{three[0][1]}"
+        register = f"{three[0][1]}_three"
         self._registers[three] = register
         self._bound |= {name for _, name in three}
         self.lines.append(f"const auto {register} = {text};")

@@ -51,7 +51,7 @@ from hamotor.codegen.unit import unit_kernels
 from hamotor.errors import UsageError
 
 MAXIMUM_TERMS = 200_000
-PACKED_STEP = re.compile(r"(four|three|all)_\w+|four|turned|lanes|result|sum\d+")
+PACKED_STEP = re.compile(r"(four|three|all)_\w+|\w+_three|four|turned|lanes|result|sum\d+")
 """What kernels name, or call, where they take four numbers at a time."""
 ClosedForm = Callable[[Algebra, Element, Element, str, str], Kernel]
 """Builds a kernel of an operand, a result, a namespace and what begins an error message."""
