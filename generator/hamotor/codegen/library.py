@@ -125,7 +125,7 @@ def _check_symbols(spec: AlgebraSpec, kernel: Kernel) -> None:
     for parameter in kernel.program.parameters:
         if parameter.name in steps or PACKED_STEP.fullmatch(parameter.name):
             other = next(
-                c for c in parameter.name + ascii_lowercase if c.isalpha() and c not in steps
+                c for c in parameter.name + ascii_lowercase if c.islower() and c not in steps
             )
             raise UsageError(
                 f'{spec.file}: element.{parameter.element.name}: "symbol" = "{parameter.name}" is '
