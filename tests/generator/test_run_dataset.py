@@ -204,14 +204,28 @@ def test_a_run_that_cannot_start_makes_no_folder(tmp_path: Path) -> None:
 def test_what_a_killed_run_left_behind_is_cleared_by_the_next(tmp_path: Path) -> None:
     ended = subprocess.Popen([sys.executable, "-c", ""])
     ended.wait()
-    left = tmp_path / f".running-{ended.pid}"
+    left = tmp_path / f".running-{ended.pid}-1f"
     (left / "0").mkdir(parents=True)
-    alive = tmp_path / f".running-{os.getppid()}"
+    # A container's process may have had the number that this one has.
+    same = tmp_path / f".running-{os.getpid()}"
+    (same / "0").mkdir(parents=True)
+    alive = tmp_path / f".running-{os.getppid()}-1f"
     alive.mkdir()
     recorder = RunFolder(tmp_path).new_recorder(DESCRIPTION, csv=False)
     recorder.close()
     assert not left.exists()
+    assert not same.exists()
     assert alive.exists()
+
+
+def test_runs_of_one_process_into_one_folder_leave_each_other_alone(tmp_path: Path) -> None:
+    first, second = RunFolder(tmp_path), RunFolder(tmp_path)
+    staged = first.new_staging()
+    (staged / "statistics.parquet").write_text("first")
+    second.new_staging()
+    second.abandon()
+    first.publish(staged, "{}")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["run.json", "statistics.parquet"]
 
 
 def test_a_folder_without_a_run_is_not_opened(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -54,6 +55,8 @@ CONVENTION = (
 
 _NUMBERS_PER_PART = 1 << 22
 _STAGING = ".running-"
+_STAGED: set[str] = set()
+"""Names of the staging folders that runs of this process use."""
 
 
 class MemoryRecorder:
@@ -318,7 +321,8 @@ class RunFolder:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        self._staging = self.path / f"{_STAGING}{os.getpid()}"
+        # A process's number alone is not enough: a container's processes have the same ones again.
+        self._staging = self.path / f"{_STAGING}{os.getpid()}-{secrets.token_hex(4)}"
         self._recordings = 0
         self._existed = self.path.exists()
         self._check()
@@ -350,6 +354,7 @@ class RunFolder:
         folder = self._staging / str(self._recordings)
         if not self._recordings:
             self._remove_abandoned()
+            _STAGED.add(self._staging.name)
         self._recordings += 1
         try:
             folder.mkdir(parents=True)
@@ -378,6 +383,7 @@ class RunFolder:
     def abandon(self) -> None:
         """Delete what is staged, and the folder if it was made for this run and stayed empty."""
         shutil.rmtree(self._staging, ignore_errors=True)
+        _STAGED.discard(self._staging.name)
         if not self._existed:
             with contextlib.suppress(OSError):
                 self.path.rmdir()
@@ -385,8 +391,8 @@ class RunFolder:
     def _remove_abandoned(self) -> None:
         """Delete the staging folders of processes that were killed."""
         for entry in self.path.glob(f"{_STAGING}*"):
-            number = entry.name.removeprefix(_STAGING)
-            if number.isdigit() and not _is_running(int(number)):
+            number = entry.name.removeprefix(_STAGING).partition("-")[0]
+            if number.isdigit() and entry.name not in _STAGED and not _is_another(int(number)):
                 shutil.rmtree(entry, ignore_errors=True)
 
 
@@ -399,7 +405,10 @@ def is_run(folder: Path) -> bool:
     return isinstance(said, dict) and {"scene", "provenance", "final"} <= said.keys()
 
 
-def _is_running(process: int) -> bool:
+def _is_another(process: int) -> bool:
+    """Whether a process of this number runs that is not this one."""
+    if process == os.getpid():
+        return False
     try:
         os.kill(process, 0)
     except ProcessLookupError:
