@@ -6,7 +6,10 @@ import hashlib
 import json
 import os
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Future
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,9 +21,10 @@ from tests.generator.toy import PUSH_AT, RATE_AT, ensemble_of_toys, interrupts, 
 
 import hamotor
 from hamotor.errors import ToolError, UsageError
-from hamotor.run import build, cluster
+from hamotor.run import build, cluster, ensemble, ensemble_pictures
 from hamotor.run.account import account
-from hamotor.run.ensemble import CHUNK, PART, Job, Part
+from hamotor.run.ensemble import CHUNK, PART, Job, Part, Tally
+from hamotor.run.ensemble_files import EnsembleFiles
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
 from hamotor.run.library import SceneLibrary
 from hamotor.run.sampling import starts
@@ -307,6 +311,88 @@ def test_a_member_that_fails_is_no_failed_run(tmp_path: Path) -> None:
         run_ensemble(toys, states=run.states[negative])
 
 
+def test_a_picture_is_of_the_times_that_were_reached(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown: list[tuple[Mapping[str, Any], NDArray[np.float64]]] = []
+
+    def draw(_report: Any, statistics: Any, sample: NDArray[np.float64], _columns: Any) -> Any:
+        shown.append((statistics, sample))
+        return {}
+
+    monkeypatch.setattr(ensemble_pictures, "draw_ensemble", draw)
+    state = toy_state()
+    state[8 + RATE_AT] = -1.0
+    with pytest.raises(EnsembleFailed, match="every member failed"):
+        run_ensemble(
+            ensemble_of_toys({"FAIL_MEMBER": 7}),
+            states=np.tile(state, (3, 1)),
+            out=tmp_path / "run",
+        )
+    ((statistics, sample),) = shown
+    assert statistics["t"].tolist() == pytest.approx([0, 0.25])
+    assert sample.shape[:2] == (3, 2)
+    assert np.isfinite(sample).all()
+
+
+def test_a_kept_member_that_could_not_start_has_no_trajectory() -> None:
+    states = np.tile(toy_state(), (3, 1))
+    states[1] = np.nan
+    run = run_ensemble(toy(end=0.5, step=0.05), states=states, keep=[0, 1])
+    assert run.report["ensemble"]["kept"] == [0]
+    assert run.failures["member"].tolist() == [1]
+    with pytest.raises(UsageError, match="member 1 was not kept; 0 were"):
+        run.trajectory(1)
+
+
+def test_what_cannot_be_written_ends_the_others_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[bool] = []
+    step = ensemble.run_chunk
+
+    def chunk(library: Any, job: Job, part: Part, first: int, meter: Any) -> Any:
+        if first >= PART:
+            for _ in range(0 if told else 500):
+                if not meter.stopped:
+                    time.sleep(0.01)
+            told.append(meter.stopped)
+            return Tally.none(job, library.description)
+        return step(library, job, part, first, meter)
+
+    def full(*_: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(ensemble, "run_chunk", chunk)
+    monkeypatch.setattr(EnsembleFiles, "append", full)
+    with pytest.raises(OSError, match="No space left"):
+        run_ensemble(ensemble_of_toys(), 3 * PART, end=0.1, threads=1, out=tmp_path / "run")
+    # At most the chunk that was under way.
+    assert told in ([], [True])
+    assert not (tmp_path / "run").exists()
+
+
+def test_an_ensemble_is_told_the_same_from_its_folder(tmp_path: Path) -> None:
+    run = run_ensemble(ensemble_of_toys(), 1, out=tmp_path / "run", pictures=False)
+    assert np.isnan(run.deviation("energy")).all()
+    assert hamotor.open_ensemble(tmp_path / "run").summary() == run.summary()
+
+
+def test_whole_numbers_may_be_those_of_numpy(tmp_path: Path) -> None:
+    one = np.ones(1, dtype=np.int64)[0]
+    run = run_ensemble(
+        ensemble_of_toys(),
+        5 * one,
+        seed=7 * one,
+        threads=one,
+        keep=np.arange(2),
+        out=tmp_path / "a",
+    )
+    assert digest(run) == digest(run_ensemble(ensemble_of_toys(), 5, seed=7, keep=[0, 1]))
+    alone = run_ensemble(ensemble_of_toys(), 5, seed=7, member=3 * one, out=tmp_path / "b")
+    assert (alone.states[0] == run.states[3]).all()
+
+
 def test_states_of_ones_own_are_where_members_start() -> None:
     states = np.tile(toy_state(), (3, 1))
     states[:, 8 + PUSH_AT] = [0.0, 1.0, 2.0]
@@ -345,6 +431,13 @@ def test_an_interrupted_ensemble_keeps_what_was_computed(tmp_path: Path) -> None
         ({"members": 5, "scheduler": "tcp://x"}, "a scheduler is for the engine dask"),
         ({"members": 5, "local_tolerance": 1e-6}, "splitting2 does not choose its steps"),
         ({"members": 5, "threads": 0}, "threads must be at least 1"),
+        ({"members": 5, "every": 0}, "every must be a whole number of steps, at least 1"),
+        ({"members": 5.5}, "members must be a whole number, not 5.5"),
+        ({"members": 5, "seed": 1.5}, "seed must be a whole number, not 1.5"),
+        ({"members": 5, "keep": [1.5]}, "keep: each must be a whole number, not 1.5"),
+        ({"members": 5, "keep": 3}, "keep must be a list of whole numbers, not 3"),
+        ({"states": np.zeros((2, 14)) + 1j}, "array of real numbers: their type is complex128"),
+        ({"states": [[0.0], [0.0, 1.0]]}, "states must be an array of real numbers: "),
         ({"states": np.zeros((2, 3))}, r"states must have shape \(members, 14\), not \(2, 3\)"),
     ],
 )
@@ -527,7 +620,8 @@ def job_of(
 
     def note(job: Job, *_: Any) -> Any:
         jobs.append(job)
-        return iter(())
+        none: list[Part] = []
+        return (part for part in none)
 
     monkeypatch.setattr(cluster, "run_parts_on", note)
     with pytest.raises(EnsembleFailed):
@@ -559,6 +653,58 @@ def test_a_part_is_a_file_that_is_written_once(
     assert replace(job, seed=4).key != job.key
     assert Job.from_json(json.loads(json.dumps(job.to_json()))) == job
     assert isinstance(Part.from_arrays(found[0].to_arrays()), Part)
+
+
+class Scheduler:
+    """In the place of dask's module: a scheduler that computes a task at once, and once."""
+
+    class KilledWorker(Exception):
+        pass
+
+    def __init__(self) -> None:
+        self.tasks: dict[str, Future[Any]] = {}
+
+    @contextmanager
+    def Client(self, address: str, **_: Any) -> Iterator[Scheduler]:
+        if not address[-1].isdigit():
+            raise ValueError("missing port number")
+        yield self
+
+    def submit(self, compute: Callable[..., Any], *of: Any, key: str, **_: Any) -> Future[Any]:
+        if key not in self.tasks:
+            self.tasks[key] = Future()
+            self.tasks[key].set_result(compute(*of))
+        return self.tasks[key]
+
+
+def test_an_ensemble_into_another_folder_has_tasks_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", Scheduler())
+    one, two = (
+        run_ensemble(
+            ensemble_of_toys(), 9, engine="dask", scheduler="tcp://a:1", out=tmp_path / name
+        )
+        for name in ("one", "two")
+    )
+    assert digest(one) == digest(two) == digest(run_ensemble(ensemble_of_toys(), 9))
+
+
+def test_a_scheduler_that_is_not_there_is_no_error_of_python(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scheduler = Scheduler()
+    monkeypatch.setitem(sys.modules, "distributed", scheduler)
+    settings: dict[str, Any] = {"engine": "dask", "out": tmp_path / "run"}
+    with pytest.raises(ToolError, match="no dask scheduler answers at nonsense: missing port"):
+        run_ensemble(ensemble_of_toys(), 9, scheduler="nonsense", **settings)
+    with pytest.raises(UsageError, match="the scheduler's address is empty"):
+        run_ensemble(ensemble_of_toys(), 9, scheduler="", **settings)
+    lost: Future[Any] = Future()
+    lost.cancel()
+    monkeypatch.setattr(scheduler, "submit", lambda *_, **__: lost)
+    with pytest.raises(ToolError, match=r"scheduler was lost.*The same command goes on"):
+        run_ensemble(ensemble_of_toys(), 9, scheduler="tcp://a:1", **settings)
 
 
 def test_dask_is_an_extra_that_the_error_tells_how_to_install(

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import json
 import logging
+import secrets
 import shutil
 import signal
 import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError
 from contextlib import ExitStack, contextmanager
 from functools import cache
 from pathlib import Path
@@ -45,13 +47,15 @@ def run_parts_on(
     workers: int,
     meter: Meter,
     tick: Callable[[], None],
-) -> Iterator[Part]:
+) -> Generator[Part, None, None]:
     """The parts in order, computed by the workers of the scheduler at an address.
 
     None: `workers` processes of this machine.  `folder` is where parts lie until all are there; a
     scheduler's workers must see it under the same name.  ToolError where dask is not installed, or
     workers cannot do it.
     """
+    if scheduler == "":
+        raise UsageError("the scheduler's address is empty.")
     if scheduler is not None and folder is None:
         raise UsageError("a scheduler needs out: a folder that all its workers see.")
     distributed = _distributed()
@@ -74,14 +78,16 @@ def run_parts_on(
                 )
         try:
             client = stack.enter_context(distributed.Client(address, set_as_default=False))
-        except OSError as problem:
+        except (OSError, ValueError) as problem:
             raise ToolError(f"no dask scheduler answers at {scheduler}: {problem}") from problem
+        # Of this call alone: the same job into another folder has tasks of its own.
+        call = secrets.token_hex(8)
         futures = {
             number: client.submit(
                 compute_part,
                 str(parts),
                 number,
-                key=f"hamotor-{job.key[:32]}-{number}",
+                key=f"hamotor-{call}-{number}",
                 priority=-number,
                 retries=_RETRIES,
             )
@@ -133,6 +139,11 @@ def _require_done(future: Any, distributed: Any) -> None:
         future.result()
     except HamotorError:
         raise
+    except CancelledError as problem:
+        raise ToolError(
+            f"the dask scheduler was lost: {problem} The same command goes on with the parts that "
+            "are there."
+        ) from problem
     except distributed.KilledWorker as problem:
         raise ToolError(f"several workers died over the same part: {problem}") from problem
     except (ImportError, AttributeError) as problem:

@@ -14,8 +14,9 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -222,13 +223,18 @@ class Meter:
     def __init__(self, stop: Callable[[], bool] = lambda: False) -> None:
         self._lock = threading.Lock()
         self._stop = stop
+        self._abandoned = False
         self.steps = 0
         self.seconds = 0.0
 
     @property
     def stopped(self) -> bool:
         """Whether the rest is not wanted any more."""
-        return self._stop()
+        return self._abandoned or self._stop()
+
+    def abandon(self) -> None:
+        """Nobody takes what is computed from now on."""
+        self._abandoned = True
 
     def add(self, steps: int, seconds: float) -> None:
         """Steps were taken, in so many seconds of one thread."""
@@ -394,13 +400,14 @@ def run_parts(
     meter: Meter,
     tick: Callable[[], None],
     states: Rows | None = None,
-) -> Iterator[Part]:
+) -> Generator[Part, None, None]:
     """The parts in order, computed by threads of this process; fewer where the meter says stop.
 
     `tick` is called now and then while they are waited for.  `states`, shape (members, state_size),
-    is where the last states shall lie; None: in arrays of their own.
+    is where the last states shall lie; None: in arrays of their own.  Closed before its end it
+    leaves the rest at once.
     """
-    with ThreadPoolExecutor(threads) as pool:
+    with ThreadPoolExecutor(threads) as pool, _left_at_once(pool, meter):
 
         def submit(number: int) -> tuple[Part, list[Future[Tally]]]:
             begin = number * PART
@@ -425,6 +432,16 @@ def run_parts(
                 waiting.append(submit(number))
                 number += 1
             yield part
+
+
+@contextmanager
+def _left_at_once(pool: ThreadPoolExecutor, meter: Meter) -> Iterator[None]:
+    """What is still under way at the end of the block is not waited for to its own end."""
+    try:
+        yield
+    finally:
+        meter.abandon()
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def library_of(job: Job) -> SceneLibrary:

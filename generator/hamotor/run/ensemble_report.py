@@ -48,6 +48,7 @@ def ensemble_report(
     failures: Mapping[str, NDArray[Any]],
     statistics: Mapping[str, NDArray[Any]],
     total: Tally,
+    kept: list[int],
     wall_s: float,
 ) -> Report:
     """The content of `run.json`.
@@ -95,7 +96,7 @@ def ensemble_report(
             "random_numbers": "Philox4x64-10",
             "random_numbers_each": 0 if job.given is not None else numbers_each(job.ensemble),
             "chunk": CHUNK,
-            "kept": sorted(k for k in job.keep if k < job.first + counts["begun"]),
+            "kept": kept,
             "quantiles_of_members": len(total.sample) if job.ensemble.quantiles else 0,
             "lanes": 1 if how is None else how.lanes,
             "isa": "" if how is None else how.isa,
@@ -189,7 +190,7 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
     conserved = said["conserved"]
     width = max(map(len, conserved), default=0)
     for name, error in conserved.items():
-        worst = f"{error['max_relative_error']:.2g}"
+        worst = f"{_number(error['max_relative_error']):.2g}"
         lines.append(f"    {name.ljust(width)}  {worst:<8} member {error['member']:,}")
     if not conserved:
         lines.append("    nothing is conserved in this scene")
@@ -207,12 +208,17 @@ def _final_lines(said: Mapping[str, Any]) -> list[str]:
     width = max(map(len, told[:_SHOWN_COLUMNS]))
     lines = [f"  {'at the end'.ljust(width + 2)}{'mean':>14}{'sd':>12}{'min':>14}{'max':>14}"]
     for name in told[:_SHOWN_COLUMNS]:
-        x = final[name]
+        x = {what: _number(final[name][what]) for what in ("mean", "sd", "min", "max")}
         lines.append(
             f"    {name.ljust(width)}{x['mean']:>14.6g}{_short(x['sd'])}{x['min']:>14.6g}"
-            f"{x['max']:>14.6g}  {x['unit']}"
+            f"{x['max']:>14.6g}  {final[name]['unit']}"
         )
     return lines
+
+
+def _number(x: float | None) -> float:
+    """Of a report that may have been read from a file, where null is what is not finite."""
+    return np.nan if x is None else x
 
 
 def _short(x: float) -> str:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import operator
 import os
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -189,7 +191,7 @@ def run_ensemble(
     states: Rows | None = None,
     seed: int | None = None,
     member: int | None = None,
-    keep: Sequence[int] | None = None,
+    keep: Sequence[int] | NDArray[np.integer[Any]] | None = None,
     threads: int | None = None,
     engine: str = "local",
     scheduler: str | None = None,
@@ -228,6 +230,9 @@ def run_ensemble(
     member that fails is no error: it is in `failures`.
     """
     simulation = scene if isinstance(scene, Simulation) else load(scene)
+    members, member = _whole("members", members), _whole("member", member)
+    threads, seed = _whole("threads", threads), _whole("seed", seed)
+    given = None if states is None else _as_states(states)
     chosen, reason = method or simulation.method, ""
     if offered := simulation.offered_to_ensembles:
         if method is None and chosen not in offered:
@@ -243,8 +248,8 @@ def run_ensemble(
         raise UsageError("a scheduler is for the engine dask.")
     if csv and out is None:
         raise UsageError("csv needs out: the folder to write statistics.csv into.")
-    first, count = _range(simulation, members, member, states)
-    kept = tuple(sorted(set(simulation.ensemble.keep if keep is None else keep)))
+    first, count = _range(simulation, members, member, given)
+    kept = simulation.ensemble.keep if keep is None else _whole_numbers("keep", keep)
     if member is not None:
         kept = (member,)
     _check_kept(kept, first, count, whole=keep is not None)
@@ -294,7 +299,7 @@ def run_ensemble(
         members=count,
         keep=tuple(k for k in kept if first <= k < first + count),
         tolerance=local_tolerance,
-        given=None if states is None else np.asarray(states, dtype=np.float64),
+        given=given,
     )
     refuse_impossible(compiled.library, job)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
@@ -304,11 +309,12 @@ def run_ensemble(
             meter = Meter(lambda: interruption.asked or time.perf_counter() > deadline)
             shown.begin("", count * job.steps)
             gathered = _Gathered(job, description, folder)
+            parts = _parts(compiled, job, gathered, engine, scheduler, threads, meter, shown)
             try:
-                for part in _parts(
-                    compiled, job, gathered, engine, scheduler, threads, meter, shown
-                ):
-                    gathered.append(part)
+                # Where a part cannot be written nobody goes on with the others.
+                with closing(parts):
+                    for part in parts:
+                        gathered.append(part)
             finally:
                 shown.end()
             run = gathered.result(
@@ -326,7 +332,8 @@ def run_ensemble(
         from hamotor.run.pictures import save
 
         columns = [column.name for column in description.columns[1:]]
-        sample = gathered.total.sample
+        # Of an interrupted run there are statistics at the first times only.
+        sample = gathered.total.sample[:, : len(run.t)]
         save(draw_ensemble(run.report, run.statistics, sample, columns), run.folder)
     if run.status == "interrupted":
         raise EnsembleInterrupted(run)
@@ -344,7 +351,7 @@ def _parts(
     threads: int,
     meter: Meter,
     shown: Progress,
-) -> Iterator[Part]:
+) -> Generator[Part, None, None]:
     def tick() -> None:
         shown.advance(meter.steps, meter.seconds)
 
@@ -392,9 +399,16 @@ class _Gathered:
         self.reasons = np.zeros(len(_reason_names()), dtype=np.int64)
         self.failures: list[dict[str, NDArray[Any]]] = []
         self.states: Rows | None = None
+        self.kept: list[int] = []
         self._staging = self._files = None
         if folder is None:
-            self.states = np.full((job.members, description.state_size), np.nan)
+            try:
+                self.states = np.full((job.members, description.state_size), np.nan)
+            except MemoryError:
+                raise UsageError(
+                    f"there is no memory for the last states of {job.members:,} members. Give "
+                    "out=DIR to have them on disk."
+                ) from None
         else:
             self._staging = folder.new_staging()
             self._files = EnsembleFiles(self._staging, job, description)
@@ -419,6 +433,7 @@ class _Gathered:
             self._files.append(part)
             if listed < _LISTED_FAILURES:
                 self.failures.append({k: x[:_LISTED_FAILURES] for k, x in found.items()})
+        self.kept += sorted(part.tally.kept)
         self.total.merge(part.tally)
         if self._files is not None:
             self.total.kept.clear()
@@ -453,6 +468,7 @@ class _Gathered:
             failures={name: values[:_LISTED_FAILURES] for name, values in failures.items()},
             statistics=statistics,
             total=total,
+            kept=self.kept,
             wall_s=wall_s,
         )
         if self._files is None:
@@ -497,12 +513,40 @@ def _reason_names() -> list[str]:
     return [reason.name.lower() for reason in Failure]
 
 
+def _whole(name: str, value: object) -> Any:
+    """A whole number, of NumPy too, as Python's; None stays.  UsageError for anything else."""
+    if value is None:
+        return None
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise UsageError(f"{name} must be a whole number, not {value!r}.") from None
+
+
+def _whole_numbers(name: str, values: object) -> tuple[int, ...]:
+    """Different ones in order."""
+    if not isinstance(values, Iterable):
+        raise UsageError(f"{name} must be a list of whole numbers, not {values!r}.")
+    return tuple(sorted({_whole(f"{name}: each", value) for value in values}))
+
+
+def _as_states(states: object) -> Rows:
+    """Real numbers as doubles, not copied where they are.  UsageError for what is none."""
+    try:
+        found = np.asarray(states)
+        if found.dtype.kind not in "biufO":
+            raise TypeError(f"their type is {found.dtype}")
+        return np.asarray(found, dtype=np.float64)
+    except (TypeError, ValueError) as problem:
+        raise UsageError(f"states must be an array of real numbers: {problem}.") from None
+
+
 def _range(
     simulation: Simulation, members: int | None, member: int | None, states: Rows | None
 ) -> tuple[int, int]:
     """First member and how many."""
     if states is not None:
-        shape = np.shape(states)
+        shape = states.shape
         if len(shape) != 2 or shape[1] != len(simulation.state) or not shape[0]:
             raise UsageError(
                 f"states must have shape (members, {len(simulation.state)}), not {shape}: "
@@ -562,7 +606,8 @@ def _planned(
             times = [x for x in simulation.times if 0 <= x / end <= 1] or None
     if interval is not None:
         times, every = at_interval(interval, end, step)
-    planned = plan(method, end=end, step=step, every=every or 1, times=times, tolerance=tolerance)
+    every = 1 if every is None else every
+    planned = plan(method, end=end, step=step, every=every, times=times, tolerance=tolerance)
     if planned.times is None:
         if planned.steps // planned.every > MOST_TIMES:
             raise UsageError(
