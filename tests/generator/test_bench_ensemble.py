@@ -21,7 +21,9 @@ def row(contestant: str, bodies: int, threads: int, million: float) -> dict[str,
         "steps_per_second": 1e6 * million,
         "flops_per_step": 500,
         "slots_per_step": 0 if contestant == "Eigen" else 250,
+        "products_per_step": 240,
         "peak_flops": 1e11,
+        "peak_mixed": 5e10,
     }
 
 
@@ -52,6 +54,14 @@ def test_ratios_are_of_the_better_compilers() -> None:
     assert "JAX, spring, rk4: 20 million with 16384 bodies; ours is 5.0 times as fast" in text
     assert "mujoco: not installed: command" in text
     assert "1048576 bodies at 80% of the rate of 1024; 2 cores at 95% each" in text
+
+
+def test_additions_with_units_of_their_own_do_not_bound() -> None:
+    found = row("packs", 1024, 2, 100)
+    shared = ensemble.bound(found)
+    apart = ensemble.bound(found | {"peak_mixed": 1e11})
+    assert shared == pytest.approx(2 * 5e10 / 250)
+    assert apart == pytest.approx(2 * 5e10 / 240)
 
 
 def test_bodies_that_move_otherwise_are_not_compared() -> None:

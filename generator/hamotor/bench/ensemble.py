@@ -97,13 +97,25 @@ def account_rows(said: Mapping[str, Any], compiler: str) -> list[dict[str, Any]]
     rows = []
     for row in said["rows"]:
         peak = row["peak_flops"] * row["threads"]
-        slots = row["slots_per_step"]
         shares = {
             "share_of_peak": row["steps_per_second"] * row["flops_per_step"] / peak,
-            "bound": peak / (2 * slots) if slots else None,
+            "bound": bound(row),
         }
         rows.append({**row, "compiler": compiler, **shares})
     return rows
+
+
+def bound(row: Mapping[str, Any]) -> float | None:
+    """Steps a second if the processor started an instruction wherever it can.
+
+    Where additions have units of their own those that multiply can be what takes longest, elsewhere
+    it is all of them together.  None where instructions were not counted.
+    """
+    if not row["slots_per_step"]:
+        return None
+    multiplying = row["products_per_step"] / (row["peak_flops"] / 2)
+    starting = row["slots_per_step"] / row["peak_mixed"]
+    return float(row["threads"] / max(multiplying, starting))
 
 
 def _peers(*words: str) -> Any:
@@ -189,7 +201,7 @@ def table(account: Mapping[str, Any]) -> str:
         *beside(account),
         *scaling(rows),
         "  FLOP: operations of a step, counted, a multiply-add as two, of which a peak is made up;",
-        "  bound: steps at the peak's clock if an instruction were started wherever one can be;",
+        "  bound: steps if multiplications and additions were started wherever the processor can;",
         "  Eigen: the same by quaternion and vectors, an array of structures, the best compiler.",
         "  Shortest times on a machine as busy as yours is now: read the ratios.",
     ]

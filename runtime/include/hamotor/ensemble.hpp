@@ -153,7 +153,7 @@ class Ensemble {
     const std::size_t workers = std::min<std::size_t>(threads_, bundles_.size());
     if (workers > 0) {
       // In pieces, which whoever is free takes: cores are not equally fast, nor left alone.
-      const std::size_t piece = std::max<std::size_t>(1, bundles_.size() / (workers * 16));
+      const std::size_t piece = std::max<std::size_t>(1, bundles_.size() / (workers * 128));
       std::atomic<std::size_t> taken{0};
       const auto work = [&] {
         while (true) {

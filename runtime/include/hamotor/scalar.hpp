@@ -296,6 +296,17 @@ template <class S>
   return atan2(y, x);
 }
 
+/// A number that is the same in every step: one that counts need not count what is found of such
+/// numbers alone.
+template <class S, class Number>
+[[nodiscard]] constexpr S fixed(const Number& x) noexcept {
+  if constexpr (requires { S::fixed(1.0); }) {
+    return S::fixed(static_cast<double>(x));
+  } else {
+    return static_cast<S>(x);
+  }
+}
+
 /// a b + c, rounded once.
 template <class S>
 [[nodiscard]] HAMOTOR_INLINE constexpr S fma(const S& a, const S& b, const S& c) noexcept {

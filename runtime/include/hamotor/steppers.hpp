@@ -103,10 +103,10 @@ template <class S, class Scheme>
   const auto exact = Scheme::template weights<CoefficientScalar<S>>();
   SplittingWeights<S, Scheme::stages> weights{};
   for (std::size_t k = 0; k < Scheme::stages; ++k) {
-    weights.drifts[k] = static_cast<S>(exact.drifts[k]);
+    weights.drifts[k] = scalar::fixed<S>(exact.drifts[k]);
   }
   for (std::size_t k = 0; k <= Scheme::stages; ++k) {
-    weights.kicks[k] = static_cast<S>(exact.kicks[k]);
+    weights.kicks[k] = scalar::fixed<S>(exact.kicks[k]);
   }
   return weights;
 }
