@@ -281,4 +281,61 @@ TEST(Translations, take_the_origin_to_the_coordinates_that_log_gives) {
   for (std::size_t k = 0; k < 2; ++k) EXPECT_NEAR(place[k], y[k], 1e-16);
 }
 
+/// log exp(b) and log(−exp(b)) are b: nothing turns in it, and −exp(b) is no exponential.
+template <class Bivector>
+void expect_log_of_both_signs(const Bivector& b) {
+  const auto r = exp(b);
+  const auto expected = b.components();
+  for (const double sign : {1.0, -1.0}) {
+    const auto found = log(sign * r).components();
+    for (std::size_t k = 0; k < expected.size(); ++k) {
+      EXPECT_NEAR(found[k], expected[k], 1e-14) << Bivector::names[k] << ", sign " << sign;
+    }
+  }
+}
+
+TEST(Logarithms, of_minus_a_boost_or_null_rotation_are_those_of_the_same_transformation) {
+  using Sta = hamotor::sta::Bivector<double>;
+  using Cga2 = hamotor::cga2::Bivector<double>;
+  using Cga3 = hamotor::cga3::Bivector<double>;
+  expect_log_of_both_signs(Sta{});
+  expect_log_of_both_signs(Sta{0, 0, 0, 0.7, 0, 0});
+  expect_log_of_both_signs(Sta{0, 0, 0, 1e-9, -2e-9, 0});
+  expect_log_of_both_signs(Sta{0, 0, 0, -1.5, 0.25, 2});
+  expect_log_of_both_signs(Sta{0, 0.5, 0, 0.5, 0, 0});
+  expect_log_of_both_signs(Sta{0, 0.5, 0, 1.5, 0, 0});
+  expect_log_of_both_signs(Cga3{});
+  expect_log_of_both_signs(Cga3{0, 0, 0, 0, 0, 0, 0.3, 0, 0, 0});
+  expect_log_of_both_signs(Cga3{0, 0, 0, 0.5, -3, 2, 0, 0, 0, 0});
+  expect_log_of_both_signs(Cga3{0, 0, 0, 0.5, -3, 0, 1.25, 0, 0, 0});
+  expect_log_of_both_signs(Cga3{0, 0, 0, 0, 0, 0, 0, 0.5, 0, 0.25});
+  expect_log_of_both_signs(Cga3{0, 0, 0, 0, 0.5, 0, 0, 0, -0.5, 0});
+  expect_log_of_both_signs(Cga2{});
+  expect_log_of_both_signs(Cga2{0, 0.5, -3, 0, 0, 0});
+  expect_log_of_both_signs(Cga2{0, 0.25, 0, -0.5, 0, 0});
+}
+
+/// exp(log(−exp(b))) is −exp(b): something turns in b.
+template <class Bivector>
+void expect_log_reaches_minus(const Bivector& b) {
+  const auto r = exp(b);
+  const auto expected = r.components();
+  const auto found = exp(log(-r)).components();
+  for (std::size_t k = 0; k < expected.size(); ++k) {
+    EXPECT_NEAR(found[k], -expected[k], 1e-13) << decltype(r)::names[k];
+  }
+}
+
+TEST(Logarithms, of_minus_a_rotation_are_its_own) {
+  using Sta = hamotor::sta::Bivector<double>;
+  using Cga3 = hamotor::cga3::Bivector<double>;
+  expect_log_reaches_minus(Sta{0.5, 0, 0, 0, 0, 0});
+  expect_log_reaches_minus(Sta{0.5, 0, 0, 0.25, 0, 0});
+  expect_log_reaches_minus(Sta{1e-6, 0, 2, 1.5, 0, 0.5});
+  expect_log_reaches_minus(Cga3{0.5, 0, 0, 0, 0, 0, 0, 0, 0, 0});
+  expect_log_reaches_minus(Cga3{0.5, 0, 0, 2, -1, 0, 0, 0, 0, 0});
+  expect_log_reaches_minus(Cga3{0.5, 0, -1, 0, 0, 0, 0.75, 0, 0, 0});
+  expect_log_reaches_minus(Cga3{0.5, 0.1, 0, 0.25, 0, 0, 0, 0.5, 0, 0});
+}
+
 }  // namespace

@@ -306,11 +306,16 @@ def log_kernel(
     else:
         out = _log_by_square(algebra, writer, value, square.get(0, {}), rho.get(0, {}))
     program = Program((parameter,), tuple(writer.bindings), outputs_for(out, result), result)
-    notes = (
+    notes = [
         "Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a",
         "bivector (not every unit versor is: −T, T a null rotation, is not).",
-    )
-    return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, notes)
+    ]
+    if not planes:
+        notes += [
+            "Where nothing turns and <R>₀ < 0, a boost's or a null rotation's −T and −1, it is log(−R),",
+            "of which exp is −R: the same transformation.",
+        ]
+    return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, tuple(notes))
 
 
 def _log_by_square(

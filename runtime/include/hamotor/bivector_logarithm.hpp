@@ -105,7 +105,9 @@ template <class S>
 /// √ρ = cos(a ± b) for rotations by a and b.  f is interpolated between these where they are
 /// separated, between a and b (one of them imaginary for a boost) where those are, and by its power
 /// series near R = 1, where neither is.  Principal: rotations with a + b ≤ π; a sheet is not
-/// changed.
+/// changed.  Where nothing turns and c < 0, R is −exp of boosts or null rotations, or −1: no
+/// function of <R>₂ alone is a logarithm of it, and this is that of −R, which is the same
+/// transformation.
 ///
 /// Where `isoclinic` > 0, `near` is the one of S ± 2 c √ρ that may nearly vanish, of the sign that
 /// S has not, without cancellation.
@@ -113,6 +115,10 @@ template <class S>
   requires(!has_lanes<S>)
 [[nodiscard]] BivectorLogarithm<S> bivector_logarithm(const S& c, const S& square, const S& rho,
                                                       const S& isoclinic, const S& near) noexcept {
+  if (c < S(0) && !(rho < S(0)) && !(square < S(0))) {
+    const auto f = bivector_logarithm(S(-c), square, rho, isoclinic, near);
+    return {-f.bivector, f.twisted};
+  }
   const S root = sqrt(abs(rho));
   if (c > S(0) && abs(square) + S(2) * root < S(0.25)) {
     // 1 − c without cancellation: c² = 1 + S − ρ
