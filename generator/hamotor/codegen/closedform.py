@@ -312,7 +312,7 @@ def log_kernel(
     ]
     if not planes:
         notes += [
-            "Where nothing turns and <R>₀ < 0, a boost's or a null rotation's −T and −1, it is log(−R),",
+            "Where nothing turns and <R>₀ < 0 (−T, T a boost or a null rotation; −1) it is log(−R),",
             "of which exp is −R: the same transformation.",
         ]
     return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, tuple(notes))
