@@ -735,8 +735,8 @@ template <class S>
 /// log(R), R ~R = 1.
 /// Principal: exp(log R) = R, the sum of both half angles in [0, π]; for R that is exp of a
 /// bivector (not every unit versor is: −T, T a null rotation, is not).
-/// Where nothing turns and <R>₀ < 0 (−T, T a boost or a null rotation; −1) it is log(−R),
-/// of which exp is −R: the same transformation.
+/// Where nothing turns and <R>₀ < 0 (−T, T a boost or a null rotation; −1): log(−R),
+/// the same transformation, of which exp is −R.
 /// Cost: 25 mul, 11 add (10 fused), 1 bivector_logarithm.
 template <class S>
 [[nodiscard]] constexpr Bivector<S> log(const Rotor<S>& r) noexcept {

@@ -312,8 +312,8 @@ def log_kernel(
     ]
     if not planes:
         notes += [
-            "Where nothing turns and <R>₀ < 0 (−T, T a boost or a null rotation; −1) it is log(−R),",
-            "of which exp is −R: the same transformation.",
+            "Where nothing turns and <R>₀ < 0 (−T, T a boost or a null rotation; −1): log(−R),",
+            "the same transformation, of which exp is −R.",
         ]
     return Kernel("log", "log(R), R ~R = 1", program, None, namespace, None, tuple(notes))
 
