@@ -264,7 +264,11 @@ def _add_run(parser: _Parser) -> None:
         default="generated",
         help="generated|generic|sparse: by table, whole or what types need of it, to compare with",
     )
-    parser.add_argument("--out", metavar="DIR", help="where to write (default: runs/SCENE)")
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="where to write (default: runs/SCENE, of an ensemble runs/SCENE_ensemble)",
+    )
     parser.add_argument("--csv", action="store_true", help="write trajectory.csv as well")
     parser.add_argument(
         "--json", action="store_true", help="print run.json on stdout, not the summary"

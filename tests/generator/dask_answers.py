@@ -15,7 +15,7 @@ from pathlib import Path
 
 import distributed
 import numpy as np
-from tests.generator.test_ensemble import digest
+from tests.generator.test_ensemble import BOUNCE, digest
 from tests.generator.toy import ensemble_of_toys
 
 from hamotor.run.dataset import PARTS
@@ -24,6 +24,16 @@ from hamotor.run.ensemble_run import EnsembleRun, run_ensemble
 
 MEMBERS = 5 * PART + 17
 END = 40.0
+
+
+def own_parameters_differ(out: Path) -> int:
+    """Numbers of states that workers find otherwise than this process, of parameters given."""
+    scene = out.with_suffix(".toml")
+    scene.write_text(BOUNCE, encoding="utf-8")
+    own = {"2.stiffness": np.linspace(20, 80, 2 * PART)}
+    here = run_ensemble(scene, parameters=own, seed=3, end=0.05)
+    there = run_ensemble(scene, parameters=own, seed=3, end=0.05, engine="dask", out=out)
+    return int((np.asarray(there.states) != here.states).sum())
 
 
 def main(out: Path) -> None:
@@ -70,6 +80,7 @@ def main(out: Path) -> None:
         "left_behind": [path.name for path in out.glob(f"{PARTS}*")],
         "engine": there.report["ensemble"]["engine"],
         "status": there.status,
+        "own_parameters_differ": own_parameters_differ(out.with_name("own")),
     }
     print(json.dumps(answer))
 

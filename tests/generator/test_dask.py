@@ -33,4 +33,5 @@ def test_a_worker_that_is_killed_changes_no_bit(tmp_path: Path) -> None:
         "left_behind": [],
         "engine": "dask",
         "status": "finished",
+        "own_parameters_differ": 0,
     }

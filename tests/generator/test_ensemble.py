@@ -345,6 +345,14 @@ def test_a_kept_member_that_could_not_start_has_no_trajectory() -> None:
         run.trajectory(1)
 
 
+def test_where_no_member_can_start_none_is_named_as_the_worst() -> None:
+    with pytest.raises(EnsembleFailed) as failed:
+        run_ensemble(toy(end=0.5, step=0.05), states=np.full((3, len(toy_state())), np.nan))
+    told = failed.value.run.summary()
+    assert "no member has started" in told
+    assert "member -1" not in told
+
+
 def test_what_cannot_be_written_ends_the_others_too(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -565,13 +573,53 @@ def test_show_says_in_what_members_differ(bounce: Simulation) -> None:
 def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:
     states = np.tile(bounce.state, (19, 1))
     states[:, 8:] += np.linspace(-1, 1, 19)[:, np.newaxis]
-    run = run_ensemble(bounce, states=states, end=0.1)
+    own = {"2.stiffness": np.full(19, 50), "1.acceleration_z": np.full(19, -9)}
+    run = run_ensemble(bounce, states=states, parameters=own, end=0.1)
     library = bounce.compile(method="rk4", compensated=True, ensembles=True).library
     for member in range(19):
         with library.start("rk4", step=0.005, state=states[member]) as live:
             live.advance(20, 0, None)
             assert (live.state() == run.states[member]).all()
     assert "19 members, given states, 20 steps of 0.005 s" in run.summary()
+
+
+def test_parameters_and_states_of_ones_own_take_the_place_of_drawn_ones(bounce: Simulation) -> None:
+    drawn = run_ensemble(bounce, 7, seed=4, end=0.5, keep=[5])
+    states, parameters = starts(bounce.ensemble, bounce.state, 4, 0, 7)
+    own = dict(zip(("2.stiffness", "1.acceleration_z"), parameters.T, strict=True))
+    for run in (
+        run_ensemble(bounce, parameters=own, end=0.5, keep=[5]),
+        run_ensemble(bounce, 7, parameters={"2.stiffness": own["2.stiffness"]}, seed=4, end=0.5),
+        run_ensemble(bounce, states=states, seed=4, end=0.5),
+        run_ensemble(bounce, states=states, parameters=own, end=0.5),
+    ):
+        assert (run.states == drawn.states).all()
+    assert run.report["ensemble"]["seed"] is None
+    other = {"2.stiffness": 2 * own["2.stiffness"]}
+    found = run_ensemble(bounce, parameters=other, seed=4, end=0.5)
+    assert (found.states != drawn.states).any(axis=1).all()
+
+
+@pytest.mark.parametrize(
+    ("own", "message"),
+    [
+        (
+            {"stiffness": [1]},
+            r'called "stiffness"; there is 2.stiff.*mean "2.stiffness"',
+        ),
+        ({"2.stiffness": 3.0}, "must be a number for each member"),
+        ({"2.stiffness": ["a"]}, "must be an array of real numbers"),
+        ({"2.stiffness": [1, np.nan]}, "of member 1 is not finite: nan"),
+        ({"2.stiffness": [1, 2], "1.acceleration_z": [1]}, "2 members, but .* of 1;"),
+    ],
+)
+def test_parameters_of_ones_own_that_do_not_fit_are_refused(
+    bounce: Simulation, own: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(UsageError, match=message):
+        run_ensemble(bounce, parameters=own)
+    with pytest.raises(UsageError, match=r"there is no member|one member by giving its alone"):
+        run_ensemble(bounce, parameters={"2.stiffness": [1, 2]}, member=1)
 
 
 def test_the_scenes_local_tolerance_is_the_ensembles(bounce: Simulation) -> None:

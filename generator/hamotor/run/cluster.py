@@ -31,13 +31,13 @@ from hamotor.errors import HamotorError, ToolError, UsageError
 from hamotor.files import whole
 from hamotor.run.build import REPOSITORY
 from hamotor.run.dataset import PARTS
-from hamotor.run.ensemble import Job, Meter, Part, library_of, run_part
+from hamotor.run.ensemble import OWN, Job, Meter, Part, library_of, run_part
 from hamotor.run.library import SceneLibrary
 
 REQUIREMENTS = REPOSITORY / "requirements-dask.lock"
 _RETRIES = 3
 _POLL_S = 0.05
-_JOB, _GIVEN = "job.json", "states.npy"
+_JOB = "job.json"
 
 
 def run_parts_on(
@@ -158,11 +158,12 @@ def _require_done(future: Any, distributed: Any) -> None:
 def _write_job(parts: Path, job: Job) -> None:
     try:
         parts.mkdir(parents=True, exist_ok=True)
-        if job.given is not None:
-            np.save(parts / f".{_GIVEN}.npy", job.given)
-            (parts / f".{_GIVEN}.npy").replace(parts / _GIVEN)
-        (parts / f".{_JOB}").write_text(json.dumps(job.to_json()), encoding="utf-8")
-        (parts / f".{_JOB}").replace(parts / _JOB)
+        for name in OWN:
+            if (own := getattr(job, name)) is not None:
+                with whole(parts / f"{name}.npy") as unfinished, unfinished.open("wb") as file:
+                    np.save(file, own)
+        with whole(parts / _JOB) as unfinished:
+            unfinished.write_text(json.dumps(job.to_json()), encoding="utf-8")
     except OSError as problem:
         raise UsageError(f"--out {parts.parent}: cannot be written: {problem}") from problem
 
@@ -181,8 +182,12 @@ def compute_part(folder: str, number: int) -> None:
 @cache
 def _job(folder: str) -> tuple[Job, SceneLibrary]:
     parts = Path(folder)
-    given = np.load(parts / _GIVEN, mmap_mode="r") if (parts / _GIVEN).is_file() else None
-    job = Job.from_json(json.loads((parts / _JOB).read_text(encoding="utf-8")), given)
+    own = {
+        name: np.load(parts / f"{name}.npy", mmap_mode="r")
+        for name in OWN
+        if (parts / f"{name}.npy").is_file()
+    }
+    job = Job.from_json(json.loads((parts / _JOB).read_text(encoding="utf-8")), own)
     return job, library_of(job)
 
 

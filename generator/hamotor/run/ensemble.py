@@ -45,6 +45,10 @@ DRAWN = 2000
 _MOST_STATISTICS = 1 << 22
 
 
+OWN = ("given", "parameters")
+"""What a `Job` has of the user's own, an array each."""
+
+
 @dataclass(frozen=True)
 class Job:
     """All that decides the numbers of an ensemble."""
@@ -68,6 +72,8 @@ class Job:
     """The local error per second of a method that chooses its steps, member by member."""
     given: Rows | None = field(default=None, compare=False)
     """States of the user's own, shape (members, state_size), in place of drawn ones."""
+    parameters: Rows | None = field(default=None, compare=False)
+    """The same of parameters, shape (members, parameters)."""
 
     @property
     def parts(self) -> int:
@@ -81,11 +87,22 @@ class Job:
 
     def starts(self, first: int, members: int) -> tuple[Rows, Rows | None]:
         """The states at which these members start, and their parameters: None for the scene's."""
+        states, parameters = np.empty((members, 0)), None
+        if self.is_drawn:
+            states, parameters = starts(
+                self.ensemble, np.array(self.own), self.seed, first, members
+            )
+        mine = slice(first - self.first, first - self.first + members)
         if self.given is not None:
-            begin = first - self.first
-            return self.given[begin : begin + members], None
-        found = starts(self.ensemble, np.array(self.own), self.seed, first, members)
-        return found if self.ensemble.parameters else (found[0], None)
+            states = self.given[mine]
+        if self.parameters is not None:
+            parameters = self.parameters[mine]
+        return states, parameters if self.ensemble.parameters else None
+
+    @property
+    def is_drawn(self) -> bool:
+        """Whether anything is: not all of it was given."""
+        return self.given is None or (self.parameters is None and bool(self.ensemble.parameters))
 
     def sampled(self, columns: int) -> int:
         """How many members, from the first, quantiles and the picture are of."""
@@ -98,17 +115,19 @@ class Job:
         return self.recorded[-1]
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values; states of the user's own by their digest."""
-        said = {name: getattr(self, name) for name in self.__dataclass_fields__ if name != "given"}
+        """As plain values; what is of the user's own by its digest."""
+        said = {name: getattr(self, name) for name in self.__dataclass_fields__}
         said["ensemble"] = asdict(self.ensemble)
-        if self.given is not None:
-            said["given"] = hashlib.sha256(np.ascontiguousarray(self.given).tobytes()).hexdigest()
+        for name in OWN:
+            own = said.pop(name)
+            if own is not None:
+                said[name] = hashlib.sha256(np.ascontiguousarray(own).tobytes()).hexdigest()
         return said
 
     @staticmethod
-    def from_json(said: Mapping[str, Any], given: Rows | None = None) -> Job:
-        """What `to_json` made of one."""
-        plain = {name: value for name, value in said.items() if name != "given"}
+    def from_json(said: Mapping[str, Any], own: Mapping[str, Rows] | None = None) -> Job:
+        """What `to_json` made of one; `own`: what is of the user's own, by name."""
+        plain = {name: value for name, value in said.items() if name not in OWN}
         return Job(
             **{
                 **plain,
@@ -116,7 +135,7 @@ class Job:
                 "ensemble": Ensemble.from_json(said["ensemble"]),
                 "own": tuple(said["own"]),
                 "keep": tuple(said["keep"]),
-                "given": given,
+                **(own or {}),
             }
         )
 

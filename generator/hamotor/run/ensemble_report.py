@@ -92,9 +92,9 @@ def ensemble_report(
             "members": job.members,
             "first": job.first,
             **counts,
-            "seed": None if job.given is not None else job.seed,
+            "seed": job.seed if job.is_drawn else None,
             "random_numbers": "Philox4x64-10",
-            "random_numbers_each": 0 if job.given is not None else numbers_each(job.ensemble),
+            "random_numbers_each": numbers_each(job.ensemble) if job.is_drawn else 0,
             "chunk": CHUNK,
             "kept": kept,
             "quantiles_of_members": len(total.sample) if job.ensemble.quantiles else 0,
@@ -190,6 +190,9 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
     conserved = said["conserved"]
     width = max(map(len, conserved), default=0)
     for name, error in conserved.items():
+        if error["member"] < 0:
+            lines.append(f"    {name.ljust(width)}  no member has started")
+            continue
         worst = f"{_number(error['max_relative_error']):.2g}"
         lines.append(f"    {name.ljust(width)}  {worst:<8} member {error['member']:,}")
     if not conserved:

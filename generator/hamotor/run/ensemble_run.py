@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hamotor.errors import NumericsError, UsageError, suggest
 from hamotor.run.choice import choose_method
@@ -35,6 +35,7 @@ from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.random_numbers import MOST_SEEDS
 from hamotor.run.report import Report, to_json
 from hamotor.run.runner import Interruption, Plan, plan, refuse_impossible_span
+from hamotor.run.sampling import starts
 from hamotor.run.simulation import ROWS, Compiled, Simulation, at_interval, load
 from hamotor.run.statistics import quantiles
 from hamotor.scene.draws import quantile_name
@@ -189,6 +190,7 @@ def run_ensemble(
     members: int | None = None,
     *,
     states: Rows | None = None,
+    parameters: Mapping[str, ArrayLike] | None = None,
     seed: int | None = None,
     member: int | None = None,
     keep: Sequence[int] | NDArray[np.integer[Any]] | None = None,
@@ -214,6 +216,8 @@ def run_ensemble(
 
     Members start where the scene's [ensemble] draws them with `seed`, or at `states`, shape
     (members, state_size): per body the motor, body to world, and the momentum, body frame.
+    `parameters` takes the place of drawn ones: by the name that the scene's [[ensemble.parameter]]
+    has ("k", "2.stiffness" of the second interaction), a number for each member.
     `member` runs that one alone: it gives the bits that it has among all.  Every `every`-th step,
     at `times` or at the multiples of `interval`, which steps must reach, statistics are taken over
     the members that are alive, and the rows of those in `keep` are kept.  With `local_tolerance`
@@ -232,7 +236,8 @@ def run_ensemble(
     simulation = scene if isinstance(scene, Simulation) else load(scene)
     members, member = _whole("members", members), _whole("member", member)
     threads, seed = _whole("threads", threads), _whole("seed", seed)
-    given = None if states is None else _as_states(states)
+    given = None if states is None else _as_numbers("states", states)
+    own = _as_parameters(simulation, parameters or {})
     chosen, reason = method or simulation.method, ""
     if offered := simulation.offered_to_ensembles:
         if method is None and chosen not in offered:
@@ -248,7 +253,7 @@ def run_ensemble(
         raise UsageError("a scheduler is for the engine dask.")
     if csv and out is None:
         raise UsageError("csv needs out: the folder to write statistics.csv into.")
-    first, count = _range(simulation, members, member, given)
+    first, count = _range(simulation, members, member, given, own)
     kept = simulation.ensemble.keep if keep is None else _whole_numbers("keep", keep)
     if member is not None:
         kept = (member,)
@@ -300,6 +305,7 @@ def run_ensemble(
         keep=tuple(k for k in kept if first <= k < first + count),
         tolerance=local_tolerance,
         given=given,
+        parameters=_with_drawn(simulation, seed, count, own),
     )
     refuse_impossible(compiled.library, job)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
@@ -530,21 +536,61 @@ def _whole_numbers(name: str, values: object) -> tuple[int, ...]:
     return tuple(sorted({_whole(f"{name}: each", value) for value in values}))
 
 
-def _as_states(states: object) -> Rows:
+def _as_numbers(name: str, values: object) -> Array:
     """Real numbers as doubles, not copied where they are.  UsageError for what is none."""
     try:
-        found = np.asarray(states)
+        found = np.asarray(values)
         if found.dtype.kind not in "biufO":
             raise TypeError(f"their type is {found.dtype}")
         return np.asarray(found, dtype=np.float64)
     except (TypeError, ValueError) as problem:
-        raise UsageError(f"states must be an array of real numbers: {problem}.") from None
+        raise UsageError(f"{name} must be an array of real numbers: {problem}.") from None
+
+
+def _as_parameters(simulation: Simulation, given: Mapping[str, object]) -> dict[str, Array]:
+    """A finite number for each member, by the parameter's name."""
+    names = [parameter.name for parameter in simulation.ensemble.parameters]
+    found = {}
+    for name, values in given.items():
+        if name not in names:
+            known = f"there is {', '.join(names)}" if names else "the scene has none"
+            raise UsageError(
+                f'parameters: no [[ensemble.parameter]] is called "{name}"; {known}.'
+                f"{suggest(name, names)}"
+            )
+        what = f'parameters["{name}"]'
+        numbers = _as_numbers(what, values)
+        if numbers.ndim != 1:
+            raise UsageError(f"{what} must be a number for each member, not {numbers.shape}.")
+        if not np.isfinite(numbers).all():
+            member = int(np.argmin(np.isfinite(numbers)))
+            raise UsageError(f"{what} of member {member} is not finite: {numbers[member]}.")
+        found[name] = numbers
+    return found
+
+
+def _with_drawn(
+    simulation: Simulation, seed: int, members: int, given: Mapping[str, Array]
+) -> Rows | None:
+    """All parameters, shape (members, parameters): those that are not given are drawn."""
+    if not given:
+        return None
+    rows = starts(simulation.ensemble, np.array(simulation.state), seed, 0, members)[1]
+    for k, parameter in enumerate(simulation.ensemble.parameters):
+        if parameter.name in given:
+            rows[:, k] = given[parameter.name]
+    return rows
 
 
 def _range(
-    simulation: Simulation, members: int | None, member: int | None, states: Rows | None
+    simulation: Simulation,
+    members: int | None,
+    member: int | None,
+    states: Rows | None,
+    parameters: Mapping[str, Array],
 ) -> tuple[int, int]:
     """First member and how many."""
+    lengths = {f'parameters["{name}"]': len(x) for name, x in parameters.items()}
     if states is not None:
         shape = states.shape
         if len(shape) != 2 or shape[1] != len(simulation.state) or not shape[0]:
@@ -552,11 +598,16 @@ def _range(
                 f"states must have shape (members, {len(simulation.state)}), not {shape}: "
                 "per body the motor and the momentum."
             )
-        if members not in {None, shape[0]}:
-            raise UsageError(f"{members} members, but states of {shape[0]}; leave members out.")
-        members = shape[0]
+        lengths["states"] = shape[0]
+    for name, count in lengths.items():
+        if members not in {None, count}:
+            raise UsageError(f"{members} members, but {name} of {count}; leave members out.")
+        members = count
+    if lengths:
         if member is not None:
-            raise UsageError("with states of your own, run one member by giving its state alone.")
+            raise UsageError(
+                f"with {' and '.join(lengths)} of your own, run one member by giving its alone."
+            )
     elif not (simulation.ensemble.bodies or simulation.ensemble.parameters):
         raise UsageError(
             f"{simulation.name}: all members would be the same; say in [[ensemble.body]] or "

@@ -549,7 +549,7 @@ ENSEMBLE = Section(
     "[ensemble]",
     "[ensemble]",
     (
-        Key("seed", "whole", "of the random numbers, below 2^63", default="0"),
+        Key("seed", "whole", "of the random numbers, at most 10^18", default="0"),
         Key("body", "tables", "[[ensemble.body]]: what is drawn of the bodies", default="[]"),
         Key(
             "parameter",
