@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from statistics import NormalDist
 
 import mpmath
 import numpy as np
 
 from hamotor.run.random_numbers import cosine_and_sine, logarithm, normals, uniforms
+from hamotor.run.sampling import starts
+from hamotor.scene.draws import BodyDraws, Draw, Ensemble, Turn
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_a_members_numbers_do_not_depend_on_the_range_that_is_drawn() -> None:
@@ -62,3 +67,35 @@ def test_elementary_functions_are_good_to_two_units_in_the_last_place() -> None:
     cosine, sine = cosine_and_sine(angles)
     np.testing.assert_allclose(cosine, [math.cos(a) for a in angles], rtol=0, atol=3e-16)
     np.testing.assert_allclose(sine, [math.sin(a) for a in angles], rtol=0, atol=3e-16)
+
+
+def test_cpp_draws_the_same_bits() -> None:
+    """`hamotor/random_numbers.hpp`: tests/runtime/random_numbers.cpp pins the same hash."""
+    rotor = tuple((k, 0, k, 0, 1.0) for k in range(4))
+    any_turn = Turn("all", Draw("normal", (0.0,) * 4, (1.0,) * 4))
+    turn = Turn("vector", Draw("normal", (0.0,) * 3, (20.0,) * 3))
+    ensemble = Ensemble(
+        bodies=(
+            BodyDraws(
+                motor=0,
+                momentum=0,
+                momenta=(
+                    (0, Draw("uniform", (-2.0,), (3.0,))),
+                    (1, Draw("normal", (1.0,), (0.5,))),
+                ),
+            ),
+            BodyDraws(motor=2, momentum=0, terms=rotor, turn=any_turn),
+            BodyDraws(motor=6, momentum=0, terms=rotor, turn=turn),
+        )
+    )
+    rows = [
+        starts(ensemble, np.zeros(10), seed, 125_003 * k**3, 1)[0].ravel()
+        for seed in (0, 2026, 2**64 - 1)
+        for k in range(200)
+    ]
+    tails = np.array([2.0**-54, 1e-12, 0.0749, 0.5, 0.9251, 1 - 1e-9, 1 - 2.0**-53])
+    hashed = 0xCBF29CE484222325
+    for word in np.concatenate([*rows, normals(tails)]).view(np.uint64).tolist():
+        hashed = (hashed ^ word) * 0x100000001B3 % 2**64
+    text = (ROOT / "tests/runtime/random_numbers.cpp").read_text(encoding="utf-8")
+    assert f'EXPECT_EQ(hash.text(), "{hashed:016x}");' in text

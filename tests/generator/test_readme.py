@@ -80,8 +80,8 @@ def test_readme_scenes_run_and_conserve_their_energy(tmp_path: Path) -> None:
 
 
 def test_readme_application_is_the_consumer_that_packaging_builds() -> None:
-    (shown,) = blocks("cpp")
-    assert shown == (ROOT / "tests/consumer/main.cpp").read_text(encoding="utf-8")
+    for name, shown in zip(("cloud", "main"), blocks("cpp"), strict=True):
+        assert shown == (ROOT / f"tests/consumer/{name}.cpp").read_text(encoding="utf-8")
     assert len(shown.splitlines()) < 30
 
 

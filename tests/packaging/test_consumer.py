@@ -64,11 +64,14 @@ def test_an_installed_and_a_bundled_hamotor_step_the_same_body(tools: Path, tmp_
     installed = step_a_body(
         tools, "find_package", tmp_path / "installed", f"-DCMAKE_PREFIX_PATH={prefix}", no_eigen
     )
-    bundled = step_a_body(tools, "add_subdirectory", tmp_path / "bundled", no_eigen)
+    release = "-DCMAKE_BUILD_TYPE=Release"
+    bundled = step_a_body(tools, "add_subdirectory", tmp_path / "bundled", no_eigen, release)
     assert installed == bundled
     found = re.search(r"relative energy error (\S+)", bundled)
     assert found
     assert abs(float(found[1])) < 1e-5
+    cloud = run(tools, tmp_path / "bundled" / "cloud")
+    assert cloud == "20000 of 20000, relative energy error 6.5e-13, mean of e3 up 0.0053\n"
 
 
 def test_the_consumer_is_short() -> None:
