@@ -4,24 +4,28 @@
 # them when the program starts (or the shared library is loaded): one binary for every processor of
 # the architecture, as fast as one that is compiled where it runs, and with the same bits on all.
 #
-# SOURCES    with TARGET's include directories, definitions and options; std::vector and whatever
-#            else is inline stays apart in each
+# SOURCES    compiled as TARGET's own, with its libraries, options and language, also those that are
+#            given to it later; std::vector and whatever else is inline stays apart in each
 # FUNCTIONS  the extern "C" functions by which they are entered; all else in them is hidden
+#
+# A target may have several calls, with a function in one of them.
 #
 # On x86-64 the sets are avx512, avx2 (with fused multiply-adds) and sse2, which every processor
 # has; fused multiply-adds are the C library's there.  The environment variable HAMOTOR_ISA forces
 # a lower one.  hamotor::instruction_set says in each what it is compiled for.  Other architectures
 # have one set, and the sources are compiled as usual.
 #
-# Needs GNU's linker and objcopy on x86-64; link-time optimisation is off for SOURCES.
+# Needs GNU's linker and objcopy on x86-64; link-time optimisation, unity builds and what
+# the project says of processors (-march=native, -mavx2) are off for SOURCES.
 
 include_guard(GLOBAL)
 
-# With the options for the compilers, and what __builtin_cpu_supports has to find for it.
+# With the options for the compilers, and what __builtin_cpu_supports has to find for it.  Options
+# also take back what the project's own name; -march=x86-64, before them, does so with processors.
 macro(hamotor_instruction_sets)
-  set(HAMOTOR_ISA_sse2_OPTIONS "")
+  set(HAMOTOR_ISA_sse2_OPTIONS -mno-sse3 -mno-popcnt -mno-lzcnt -mno-bmi -mno-bmi2)
   set(HAMOTOR_ISA_sse2_FEATURES "")
-  set(HAMOTOR_ISA_avx2_OPTIONS -mavx2 -mfma -mbmi -mbmi2)
+  set(HAMOTOR_ISA_avx2_OPTIONS -mno-avx512f -mavx2 -mfma -mbmi -mbmi2)
   set(HAMOTOR_ISA_avx2_FEATURES avx2 fma bmi bmi2)
   set(HAMOTOR_ISA_avx512_OPTIONS ${HAMOTOR_ISA_avx2_OPTIONS} -mavx512f -mavx512cd -mavx512bw
                                  -mavx512dq -mavx512vl)
@@ -35,6 +39,11 @@ function(hamotor_dispatch target)
   if(NOT TARGET ${target})
     message(FATAL_ERROR "${here}: there is no such target; add it before")
   endif()
+  get_target_property(type ${target} TYPE)
+  if(NOT type MATCHES "^(EXECUTABLE|(STATIC|SHARED|MODULE)_LIBRARY)$")
+    message(FATAL_ERROR "${here}: a target of type ${type}; allowed are executables and static, "
+                        "shared and module libraries")
+  endif()
   if(arg_UNPARSED_ARGUMENTS)
     message(FATAL_ERROR "${here}: unknown arguments: ${arg_UNPARSED_ARGUMENTS}; "
                         "allowed are SOURCES and FUNCTIONS")
@@ -42,12 +51,37 @@ function(hamotor_dispatch target)
   if(NOT arg_SOURCES OR NOT arg_FUNCTIONS)
     message(FATAL_ERROR "${here}: give SOURCES FILE... and FUNCTIONS NAME...")
   endif()
+  get_target_property(dispatched ${target} HAMOTOR_DISPATCHED)
+  if(NOT dispatched)
+    set(dispatched "")
+  endif()
   foreach(function IN LISTS arg_FUNCTIONS)
     if(NOT function MATCHES "^[A-Za-z_][A-Za-z0-9_]*$")
       message(FATAL_ERROR "${here}: \"${function}\" is not the name of an extern \"C\" function")
     endif()
+    if(function IN_LIST dispatched)
+      message(FATAL_ERROR "${here}: \"${function}\" is listed twice; each function is entered in "
+                          "one place")
+    endif()
+    list(APPEND dispatched ${function})
+  endforeach()
+  get_target_property(base ${target} SOURCE_DIR)
+  set(others "")
+  get_property(sources TARGET ${target} PROPERTY SOURCES)
+  foreach(source IN LISTS sources)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${base}" NORMALIZE)
+    list(APPEND others "${source}")
+  endforeach()
+  foreach(source IN LISTS arg_SOURCES)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY "${CMAKE_CURRENT_SOURCE_DIR}" NORMALIZE
+               OUTPUT_VARIABLE path)
+    if(path IN_LIST others)
+      message(FATAL_ERROR "${here}: ${source} is among the target's other sources, too, and would "
+                          "be compiled for one processor there; leave it out there")
+    endif()
   endforeach()
   target_compile_definitions(${target} PRIVATE HAMOTOR_FUSED)
+  set_property(TARGET ${target} PROPERTY HAMOTOR_DISPATCHED ${dispatched})
   if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
     target_sources(${target} PRIVATE ${arg_SOURCES})
     return()
@@ -57,45 +91,92 @@ function(hamotor_dispatch target)
   endif()
 
   hamotor_instruction_sets()
-  set(folder "${CMAKE_CURRENT_BINARY_DIR}/hamotor_dispatch/${target}")
+  # What is bytecode has no symbols to hide.
+  set(bare -march=x86-64 -fno-lto $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-fno-whole-program-vtables>)
+  # A target may have several calls; they are known by their first functions.
+  list(GET arg_FUNCTIONS 0 first)
+  set(parts ${target}_${first})
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/hamotor_dispatch/${parts}")
+  hamotor_dispatcher("${folder}/dispatcher.cpp" ${arg_FUNCTIONS})
+  # Its own library: neither warnings nor optimisation of the target are for what is written here.
+  add_library(${parts}_dispatcher OBJECT EXCLUDE_FROM_ALL "${folder}/dispatcher.cpp")
+  target_compile_features(${parts}_dispatcher PRIVATE cxx_std_17)
+  target_compile_options(${parts}_dispatcher PRIVATE -w -masm=att ${bare}
+                                                     ${HAMOTOR_ISA_sse2_OPTIONS})
+  set_target_properties(${parts}_dispatcher PROPERTIES POSITION_INDEPENDENT_CODE ON
+                                                       INTERPROCEDURAL_OPTIMIZATION OFF
+                                                       CXX_CLANG_TIDY "")
+
+  # Sources that are generated are generated once, and not by each library.
+  add_custom_target(${parts}_sources DEPENDS ${arg_SOURCES})
+  set(all_hidden "")
   foreach(isa sse2 avx2 avx512)
-    set(objects ${target}_${isa})
-    add_library(${objects} OBJECT ${arg_SOURCES})
-    set_target_properties(${objects} PROPERTIES POSITION_INDEPENDENT_CODE ON
+    set(objects ${parts}_${isa})
+    add_library(${objects} OBJECT EXCLUDE_FROM_ALL ${arg_SOURCES})
+    add_dependencies(${objects} ${parts}_sources)
+    set_target_properties(${objects} PROPERTIES POSITION_INDEPENDENT_CODE ON UNITY_BUILD OFF
                                                 INTERPROCEDURAL_OPTIMIZATION OFF)
-    foreach(property INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS COMPILE_FEATURES)
+    foreach(property INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS COMPILE_FEATURES
+                     LINK_LIBRARIES PRECOMPILE_HEADERS)
       set_property(TARGET ${objects} PROPERTY ${property}
                                               "$<TARGET_PROPERTY:${target},${property}>")
     endforeach()
-    # After the target's own, which may name a processor.
-    target_compile_options(
-      ${objects} PRIVATE -march=x86-64 ${HAMOTOR_ISA_${isa}_OPTIONS}
-                         $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+    # After the target's own.  Nobody can put functions of his own in place of what is hidden.
+    target_compile_options(${objects} PRIVATE ${bare} ${HAMOTOR_ISA_${isa}_OPTIONS}
+                                              -fno-semantic-interposition
+                                              $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fno-gnu-unique>)
 
     # Inline functions are the same by name and not by instructions: the linker would take any.
-    set(joined "${folder}/${isa}-joined.o")
-    set(hidden "${folder}/${isa}.o")
+    set(joined "${folder}/${isa}-$<CONFIG>-joined.o")
+    set(hidden "${folder}/${isa}-$<CONFIG>.o")
+    set(compiled "$<FILTER:$<TARGET_OBJECTS:${objects}>,EXCLUDE,\\.[gp]ch$>")
+    set(required "")
     set(kept "")
     set(renamed "")
     foreach(function IN LISTS arg_FUNCTIONS)
+      list(APPEND required "-Wl,--require-defined=${function}")
       list(APPEND kept "--keep-global-symbol=${function}")
       list(APPEND renamed "--redefine-sym=${function}=${function}_${isa}")
     endforeach()
     add_custom_command(
       OUTPUT "${hidden}"
-      COMMAND "${CMAKE_COMMAND}" -E make_directory "${folder}"
-      COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -Wl,--force-group-allocation -o "${joined}"
-              $<TARGET_OBJECTS:${objects}>
+      COMMAND "${CMAKE_CXX_COMPILER}" -r -nostdlib -Wl,--force-group-allocation ${required} -o
+              "${joined}" "${compiled}"
       COMMAND "${CMAKE_OBJCOPY}" ${kept} "${joined}"
       COMMAND "${CMAKE_OBJCOPY}" ${renamed} "${joined}" "${hidden}"
-      DEPENDS ${objects} $<TARGET_OBJECTS:${objects}>
+      # The dispatcher, since it changes with the functions.
+      DEPENDS ${objects} "${compiled}" "${folder}/dispatcher.cpp"
       COMMENT "Hiding all but the functions of ${target} for ${isa}"
       COMMAND_EXPAND_LISTS VERBATIM)
-    target_sources(${target} PRIVATE "${hidden}")
-    set_source_files_properties("${hidden}" PROPERTIES EXTERNAL_OBJECT ON GENERATED ON)
+    list(APPEND all_hidden "${hidden}")
   endforeach()
-  hamotor_dispatcher("${folder}/dispatcher.cpp" ${arg_FUNCTIONS})
-  target_sources(${target} PRIVATE "${folder}/dispatcher.cpp")
+  target_sources(${target} PRIVATE ${all_hidden} $<TARGET_OBJECTS:${parts}_dispatcher>)
+  # A target of another folder does not know the commands of this one.
+  add_custom_target(${parts} DEPENDS ${all_hidden})
+  add_dependencies(${parts}_dispatcher ${parts})
+
+  # What generator expressions do not pass on, once all is said about the target.
+  foreach(isa sse2 avx2 avx512)
+    cmake_language(EVAL CODE "cmake_language(DEFER DIRECTORY [[${CMAKE_SOURCE_DIR}]] CALL
+                              hamotor_compile_alike ${target} ${parts}_${isa})")
+  endforeach()
+endfunction()
+
+function(hamotor_compile_alike target objects)
+  set(properties VISIBILITY_INLINES_HIDDEN)
+  foreach(language C CXX)
+    foreach(property STANDARD STANDARD_REQUIRED EXTENSIONS VISIBILITY_PRESET)
+      list(APPEND properties ${language}_${property})
+    endforeach()
+  endforeach()
+  foreach(property IN LISTS properties)
+    get_property(value TARGET ${target} PROPERTY ${property})
+    set_property(TARGET ${objects} PROPERTY ${property} ${value})
+  endforeach()
+  get_target_property(dependencies ${target} MANUALLY_ADDED_DEPENDENCIES)
+  if(dependencies)
+    add_dependencies(${objects} ${dependencies})
+  endif()
 endfunction()
 
 # The file that chooses: a jump for each function, whatever its arguments are.
@@ -129,8 +210,9 @@ function(hamotor_dispatcher file)
   HAMOTOR_HIDDEN void (*hamotor_##name##_chosen)();                                          \
   void (*hamotor_##name##_chosen)() = name##_sse2;                                           \
   static void (*const hamotor_##name##_all[])() = {name##_sse2, name##_avx2, name##_avx512}; \
-  asm(".text\n.p2align 4\n.globl " #name "\n.type " #name ", @function\n" #name              \
-      ":\n  endbr64\n  jmp *hamotor_" #name "_chosen(%rip)\n.size " #name ", .-" #name "\n");
+  asm(".pushsection .text\n.p2align 4\n.globl " #name "\n.type " #name ", @function\n"       \
+      #name ":\n  endbr64\n  jmp *hamotor_" #name "_chosen(%rip)\n"                          \
+      ".size " #name ", .-" #name "\n.popsection\n");
 @functions@
 namespace {
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
+from tests.packaging.cmake_projects import ROOT, configure, project, run
 
 pytestmark = pytest.mark.slow
 
@@ -41,39 +39,6 @@ int main() {{
   std::printf("%d\\n", {product});
 }}
 """
-
-
-def attempt(*command: str | Path) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        check=False,
-    )
-
-
-def run(*command: str | Path) -> str:
-    answer = attempt(*command)
-    assert answer.returncode == 0, answer.stdout
-    return answer.stdout
-
-
-def project(folder: Path, call: str, find: str = f'add_subdirectory("{ROOT}" hamotor)') -> None:
-    folder.mkdir(exist_ok=True)
-    (folder / "CMakeLists.txt").write_text(
-        "cmake_minimum_required(VERSION 3.22)\n"
-        "project(user LANGUAGES CXX)\n"
-        "enable_testing()\n"
-        f"{find}\n"
-        f"{call}\n",
-        encoding="utf-8",
-    )
-
-
-def configure(folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
-    return attempt("cmake", "-G", "Ninja", *options, "-S", folder, "-B", folder / "build")
 
 
 APP = "add_executable(app main.cpp)\ntarget_link_libraries(app PRIVATE hamotor::{name})"
