@@ -88,24 +88,29 @@ function(hamotor_add_algebra name)
   endif()
 
   # What the text depends on besides the spec: the generator, where its source can be seen.
-  cmake_path(GET HAMOTOR_EXECUTABLE PARENT_PATH root)
-  file(GLOB generator "${root}/generator/hamotor/codegen/*.py" "${root}/templates/*.jinja"
-       "${root}/runtime/include/hamotor/scalar.hpp" "${root}/runtime/include/hamotor/generic.hpp")
+  file(REAL_PATH "${HAMOTOR_EXECUTABLE}" executable)
+  cmake_path(GET executable PARENT_PATH root)
+  file(GLOB generator CONFIGURE_DEPENDS
+       "${root}/generator/hamotor/*.py" "${root}/generator/hamotor/codegen/*.py"
+       "${root}/generator/algebras/*.toml" "${root}/templates/*.jinja"
+       "${root}/runtime/include/hamotor/*.hpp" "${root}/requirements.lock"
+       "${root}/.clang-format")
 
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/hamotor_algebras/${name}")
   set(header "${folder}/include/hamotor/${name}/${name}.hpp")
+  set(elements "${folder}/include/hamotor/${name}/elements.hpp")
   set(test "${folder}/test/${name}_test.cpp")
-  set(stamp "${folder}.stamp")
-  # The generator leaves files alone that do not change, so that nothing is compiled in vain.
+  # All functions of the algebra come with its elements: by them what includes any is compiled again,
+  # also where Ninja does not know which headers there are.
   add_custom_command(
-    OUTPUT "${stamp}"
+    OUTPUT "${elements}"
     BYPRODUCTS "${header}" "${test}"
     COMMAND "${HAMOTOR_EXECUTABLE}" generate ${what} --out "${folder}"
-    COMMAND "${CMAKE_COMMAND}" -E touch "${stamp}"
-    DEPENDS ${arg_SPEC} ${generator}
+    COMMAND "${CMAKE_COMMAND}" -E touch "${elements}"
+    DEPENDS ${arg_SPEC} "${executable}" ${generator}
     COMMENT "Generating the algebra ${name}"
     VERBATIM)
-  add_custom_target(hamotor_generate_${name} DEPENDS "${stamp}")
+  add_custom_target(hamotor_generate_${name} DEPENDS "${elements}")
 
   add_library(hamotor_algebra_${name} INTERFACE)
   add_library(hamotor::${name} ALIAS hamotor_algebra_${name})

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import shutil
+import sys
 from pathlib import Path
 
 import pytest
-from tests.packaging.cmake_projects import ROOT, configure, project, run
+from tests.packaging.cmake_projects import ROOT, build, configure, project, run
 
 pytestmark = pytest.mark.slow
 
@@ -75,6 +77,39 @@ def test_a_changed_spec_is_generated_again(tmp_path: Path) -> None:
     spec.write_text(SPEC.replace("SQUARE", "-1"), encoding="utf-8")
     run("cmake", "--build", build)
     assert run(build / "app") == "-3\n"
+
+
+def test_whatever_the_generator_reads_is_generated_and_compiled_from_again(tmp_path: Path) -> None:
+    tree = tmp_path / "tree"
+    for part in ("cmake", "generator/hamotor", "generator/algebras", "runtime", "templates"):
+        shutil.copytree(ROOT / part, tree / part, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / ".clang-format", tree)
+    launcher = tmp_path / "hamotor"
+    (tree / "hamotor").write_text(
+        f"#!/bin/sh\nPYTHONPATH='{tree / 'generator'}' exec '{sys.executable}' -m hamotor \"$@\"\n",
+        encoding="utf-8",
+    )
+    (tree / "hamotor").chmod(0o755)
+    launcher.symlink_to(tree / "hamotor")
+    include = f'include("{tree / "cmake" / "HamotorAddAlgebra.cmake"}")'
+    project(
+        tmp_path, f"hamotor_add_algebra(line SPEC line.toml)\n{APP.format(name='line')}", include
+    )
+    (tmp_path / "line.toml").write_text(SPEC.replace("SQUARE", "1"), encoding="utf-8")
+    main = '#include "hamotor/line/kernels.hpp"\nint main() {}\n'
+    (tmp_path / "main.cpp").write_text(main, encoding="utf-8")
+    folder = build(tmp_path, f"-DHAMOTOR_EXECUTABLE={launcher}")
+    for file, comment in (
+        ("runtime/include/hamotor/lanes.hpp", "// changed"),
+        ("templates/kernels.hpp.jinja", "// changed"),
+        ("generator/hamotor/files.py", "# changed"),
+    ):
+        with (tree / file).open("a", encoding="utf-8") as text:
+            text.write(f"\n{comment}\n")
+        said = run("cmake", "--build", folder)
+        assert "Generating the algebra line" in said
+        assert "main.cpp.o" in said
+        assert "no work to do" in run("cmake", "--build", folder)
 
 
 def test_a_spec_is_known_by_its_name_however_toml_writes_it(tmp_path: Path) -> None:
