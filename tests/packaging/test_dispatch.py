@@ -78,23 +78,38 @@ def computes_the_same_on_every_set(program: Path) -> None:
         assert run("env", f"HAMOTOR_ISA={isa}", program).split() == [isa, bits]
 
 
-@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+OPTIONS = {
+    "interprocedural": (
+        "-DCMAKE_INTERPROCEDURAL_OPTIMIZATION_RELEASE=ON",
+        "-DCMAKE_BUILD_TYPE=Release",
+    ),
+    "lto": ("-DCMAKE_CXX_FLAGS=-flto -march=native",),
+    "unity": (
+        "-DCMAKE_CXX_FLAGS=-mavx2 -Werror",
+        "-DCMAKE_UNITY_BUILD=ON",
+        "-DCMAKE_BUILD_TYPE=Debug",
+    ),
+}
+
+
 @pytest.mark.parametrize(
-    "options",
+    ("compiler", "options"),
     [
-        ["-DCMAKE_INTERPROCEDURAL_OPTIMIZATION_RELEASE=ON", "-DCMAKE_BUILD_TYPE=Release"],
-        ["-DCMAKE_CXX_FLAGS=-flto -march=native"],
-        ["-DCMAKE_CXX_FLAGS=-mavx2 -Werror", "-DCMAKE_UNITY_BUILD=ON", "-DCMAKE_BUILD_TYPE=Debug"],
+        ("g++", "interprocedural"),
+        ("clang++", "lto"),
+        ("g++", "unity"),
+        pytest.param("clang++", "interprocedural", marks=pytest.mark.long),
+        pytest.param("g++", "lto", marks=pytest.mark.long),
+        pytest.param("clang++", "unity", marks=pytest.mark.long),
     ],
-    ids=["interprocedural", "lto", "unity"],
 )
 def test_options_of_a_project_leave_instruction_sets_apart(
-    tmp_path: Path, compiler: str, options: list[str]
+    tmp_path: Path, compiler: str, options: str
 ) -> None:
     own = "namespace {\n[[maybe_unused]] int choose() { return 1; }\n}  // namespace\n"
     sources(tmp_path, main=own, members=own, set=own)
     project(tmp_path, APP)
-    folder = build(tmp_path, f"-DCMAKE_CXX_COMPILER={compiler}", *options)
+    folder = build(tmp_path, f"-DCMAKE_CXX_COMPILER={compiler}", *OPTIONS[options])
     computes_the_same_on_every_set(folder / "app")
 
 
