@@ -152,17 +152,69 @@ TEST(MoserVeselov, keeps_the_digits_of_a_needles_spin) {
   check(std::integral_constant<int, 10>{}, 1e-8);
 }
 
-TEST(MoserVeselov, starts_anew_where_the_state_was_changed) {
-  const auto system = sample::free_so3();
-  using Method = MoserVeselov<Of<decltype(system)>, 10>;
+template <class Method, class System>
+void expect_to_start_anew(const System& system, const hamotor::StateOf<System>& changed) {
   auto state = generic_state(system);
   Method method;
+  for (int k = 0; k < 5; ++k) method.do_step(system, state, 0, 0.1);
+  state = changed;
+  for (int steps = 1; steps < 4; ++steps) {
+    method.do_step(system, state, 0, 0.1);
+    EXPECT_EQ(state, stepped<Method>(system, changed, 0.1, steps)) << Method::name << ' ' << steps;
+  }
+}
+
+TEST(MoserVeselov, of_a_changed_state_has_the_bits_of_a_new_stepper) {
+  const auto check = [](const auto& system, auto order) {
+    using Method = MoserVeselov<std::remove_cvref_t<decltype(system)>, order.value>;
+    auto changed = stepped<Method>(system, generic_state(system), 0.1, 3);
+    expect_to_start_anew<Method>(system, changed);
+    changed.motors[0] = -changed.motors[0];
+    expect_to_start_anew<Method>(system, changed);
+    for (const double by : {1.5, -0.2, 1e-3}) {
+      changed.momenta[0] = by * changed.momenta[0];
+      expect_to_start_anew<Method>(system, changed);
+    }
+  };
+  using std::integral_constant;
+  check(sample::free_so3(), integral_constant<int, 2>{});
+  check(sample::free_so3(), integral_constant<int, 4>{});
+  check(sample::free_se3(), integral_constant<int, 6>{});
+  check(sample::free_se2(), integral_constant<int, 8>{});
+  check(sample::free_so3(), integral_constant<int, 10>{});
+  check(sample::forced_so3(), integral_constant<int, 2>{});
+  check(sample::forced_se3(), integral_constant<int, 2>{});
+  check(sample::two_bodies_se2(), integral_constant<int, 2>{});
+}
+
+TEST(MoserVeselov, of_another_state_goes_on_where_a_step_failed) {
+  const auto system = sample::free_so3();
+  using Method = MoserVeselov<Of<decltype(system)>, 6>;
+  const auto start = generic_state(system);
+  auto state = start;
+  Method method;
+  method.do_step(system, state, 0, 100);
+  EXPECT_EQ(method.failure(), Failure::no_convergence);
+  state = start;
   method.do_step(system, state, 0, 0.1);
-  state = generic_state(system);
-  state.momenta[0] = 1.5 * state.momenta[0];
-  const auto start = state;
-  method.do_step(system, state, 0, 0.1);
-  EXPECT_LT(distance(state, stepped<Method>(system, start, 0.1, 1)), 1e-15);
+  EXPECT_EQ(method.failure(), Failure::none);
+  EXPECT_EQ(state, stepped<Method>(system, start, 0.1, 1));
+}
+
+TEST(MoserVeselov, stays_where_it_is_in_no_time) {
+  const auto check = [](const auto& system, auto order) {
+    using Method = MoserVeselov<std::remove_cvref_t<decltype(system)>, order.value>;
+    const auto start = generic_state(system);
+    EXPECT_EQ(stepped<Method>(system, start, 0, 3), start);
+    auto state = start;
+    Method method;
+    for (const double h : {0.1, 0.0, 0.1, 0.0, 0.1}) method.do_step(system, state, 0, h);
+    EXPECT_EQ(method.failure(), Failure::none);
+    EXPECT_EQ(state, stepped<Method>(system, start, 0.1, 3));
+  };
+  check(sample::free_so3(), std::integral_constant<int, 10>{});
+  check(sample::forced_se3(), std::integral_constant<int, 2>{});
+  check(sample::free_se2(), std::integral_constant<int, 4>{});
 }
 
 TEST(MoserVeselov, says_where_a_step_turns_too_far) {

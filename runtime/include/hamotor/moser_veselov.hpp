@@ -197,7 +197,10 @@ class Rotation {
     }
   }
 
-  /// The rotation of a step of h and what it adds to Π; whether there is one.
+  /// The next step is from another state, to which the last steps do not point.
+  constexpr void forget() noexcept { known_ = 0; }
+
+  /// The rotation of a step of h ≠ 0 and what it adds to Π; whether there is one.
   ///
   /// With e = v/w of its rotor w + v it solves (1 + |e|²) h Π/2 = J e + e × J e, by Newton's method
   /// from where the last steps point to.
@@ -210,7 +213,8 @@ class Rotation {
     const auto& [d1, d2, d3] = differences_;
     // Newton's errors are squared: what comes after a change this small is rounding.
     const S enough = S(0.0625) * scalar::sqrt(scalar::Limits<S>::epsilon());
-    auto [x, y, z] = h == step_ ? guess() : std::array<S, 3>{a[0] / j1, a[1] / j2, a[2] / j3};
+    const bool goes_on = known_ > 0 && h == step_;
+    auto [x, y, z] = goes_on ? guess() : std::array<S, 3>{a[0] / j1, a[1] / j2, a[2] / j3};
     S square(0);
     bool found = false;
     for (int i = 0; i < 40 && !found; ++i) {
@@ -273,7 +277,7 @@ class Rotation {
   }
 
   constexpr void remember(const std::array<S, 3>& e, const S& h) noexcept {
-    known_ = h == step_ ? known_ + (known_ < 3 ? 1 : 0) : 1;
+    known_ = known_ > 0 && h == step_ ? known_ + (known_ < 3 ? 1 : 0) : 1;
     step_ = h;
     for (std::size_t j = 0; j < 3; ++j) last_[j] = {e[j], last_[j][0], last_[j][1]};
   }
@@ -380,7 +384,7 @@ class FreelyStepped {
 /// bounded. Order 2 is symplectic.  Above order 2 the moments depend on the state by what it
 /// conserves, and the motion of the momenta is a Poisson map, but that of the whole state is not
 /// symplectic. A step that turns a body too far for the equation to have a solution (h Π/2J of
-/// about 1) fails.
+/// about 1) fails.  A state that is not the one the last step left starts anew.
 template <RigidSystem System, int nominal_order, Summation summation = Summation::compensated>
   requires(nominal_order == 2 || FreeSystem<System>)
 class MoserVeselov {
@@ -397,16 +401,21 @@ class MoserVeselov {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
-    if (!(set_up_for_ == h && (order == 2 || state.momenta == delivered_))) {
-      set_up(system, state, h);
+    failure_ = Failure::none;
+    if (h == S(0)) return;  // whose moments and change are quotients of zeros
+    const bool goes_on = state == delivered_;
+    if (!goes_on) {
+      for (auto& rotation : rotations_) rotation.forget();
+      splitting_.forget();
     }
+    if (!(set_up_for_ == h && (order == 2 || goes_on))) set_up(system, state, h);
     bool found = true;
     splitting_.do_step(Stepped(system, rotations_, found), state, t, h);
-    failure_ = found ? Failure::none : Failure::no_convergence;
     if (!found) {
+      failure_ = Failure::no_convergence;
       for (auto& momentum : state.momenta) momentum = (S(0) / S(0)) * momentum;
     }
-    if constexpr (order > 2) delivered_ = state.momenta;
+    delivered_ = state;
   }
 
   /// How far the steps so far left the group.
@@ -436,8 +445,8 @@ class MoserVeselov {
 
   typename Stepped::Rotations rotations_{};
   Splitting<Stepped, 2, summation> splitting_;
-  decltype(StateOf<System>::momenta) delivered_{};
-  S set_up_for_{};
+  StateOf<System> delivered_{};
+  S set_up_for_{};  ///< h; 0 before the first step
   Failure failure_ = Failure::none;
 };
 

@@ -923,6 +923,13 @@ class Splitting {
     }
   }
 
+  /// The next step is from another state.
+  constexpr void forget() noexcept {
+    if constexpr (System::has_forque) known_.any = false;
+    low_ = {};
+    open_steps_ = 0;
+  }
+
   /// From a state to one inside the first step, to be taken further by open steps of h.
   constexpr void open(const System& system, StateOf<System>& state, const S& h) const noexcept
     requires(stays_open)
