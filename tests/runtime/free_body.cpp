@@ -340,4 +340,34 @@ TEST(ClosedForm, starts_anew_where_the_state_was_changed) {
   EXPECT_LT(distance(state, other), 1e-15);
 }
 
+TEST(ClosedForm, starts_anew_where_the_time_is_another) {
+  const auto system = sample::free_se3();
+  using Method = hamotor::ClosedForm<std::remove_const_t<decltype(system)>>;
+  auto state = generic_state(system);
+  Method method;
+  method.do_step(system, state, 0, 0.7);
+  auto other = state;
+  method.do_step(system, state, 3, 0.7);
+  Method{}.do_step(system, other, 3, 0.7);
+  EXPECT_EQ(state, other);
+  // From one time all the time, as nothing here depends on it.
+  for (int k = 0; k < 3; ++k) method.do_step(system, state, 5, 0.7);
+  Method{}.do_step(system, other, 5, 3 * 0.7);
+  EXPECT_LT(distance(state, other), 1e-14);
+}
+
+TEST(ClosedForm, of_momenta_that_are_no_numbers_has_none) {
+  const auto system = sample::free_so3();
+  for (std::size_t k = 0; k < 3; ++k) {
+    for (const double size : {0.0, 1.0}) {
+      auto state = generic_state(system);
+      std::array<double, 3> momentum{size, size, size};
+      momentum[k] = std::nan("");
+      state.momenta[0] = sample::SO3::Momentum<double>::from(momentum);
+      hamotor::ClosedForm<std::remove_const_t<decltype(system)>>{}.do_step(system, state, 0, 0.7);
+      EXPECT_FALSE(is_finite(state)) << k << ' ' << size;
+    }
+  }
+}
+
 }  // namespace

@@ -362,7 +362,8 @@ class FreeRotation {
     const Wide largest = scalar::max_abs(angular[0], angular[1], angular[2]);
     std::array<Wide, 3> p{Wide(0), Wide(0), Wide(1)};
     Wide momentum(0);
-    if (largest > Wide(0)) {
+    const auto rests = [](const Wide& x) { return x == Wide(0); };
+    if (!(rests(angular[0]) && rests(angular[1]) && rests(angular[2]))) {
       for (std::size_t k = 0; k < 3; ++k) p[k] = angular[k] / largest;
       const Wide length = scalar::sqrt(detail::dot(p, p));
       for (auto& component : p) component = component / length;
@@ -678,7 +679,8 @@ template <class System>
 concept FreeSystem = RigidSystem<System> && !System::has_forque;
 
 /// Free bodies in closed form: every step is evaluated from the state that the first one started
-/// at, so that errors do not add up, whatever the step.  A state changed in between starts anew.
+/// at, so that errors do not add up, whatever the step.  A state changed in between starts anew,
+/// and so does a time that is not the one delivered.
 template <FreeSystem System>
 class ClosedForm {
   using S = typename System::Scalar;
@@ -692,7 +694,7 @@ class ClosedForm {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
-    if (!(motions_ && state == delivered_)) {
+    if (!(motions_ && state == delivered_ && is_delivered(t))) {
       motions_ = from(system, state, std::make_index_sequence<n>{});
       start_ = t;
     }
@@ -708,6 +710,7 @@ class ClosedForm {
     }
     detail::record(drift_, worst);
     delivered_ = state;
+    delivered_time_ = t + h;
   }
 
   /// How far from the group the motors were evaluated.
@@ -723,9 +726,16 @@ class ClosedForm {
                              state.motors[i], state.momenta[i])...};
   }
 
+  /// Times that differ by rounding are the same.
+  [[nodiscard]] constexpr bool is_delivered(const S& t) const noexcept {
+    const S slack = S(8) * scalar::Limits<S>::epsilon() * scalar::max_abs(t, delivered_time_);
+    return scalar::abs(t - delivered_time_) <= slack;
+  }
+
   std::optional<Motions> motions_;
   S start_{};
   StateOf<System> delivered_{};
+  S delivered_time_{};
   Drift<S> drift_;
 };
 
