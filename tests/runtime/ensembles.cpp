@@ -133,6 +133,25 @@ TEST(Ensembles, a_member_has_the_bits_of_a_run_by_itself) {
   expect_bits_of_a_run<Splitting2>(sample::forced_so3(), sample::forced_so3<Pack<double, 4>>());
 }
 
+template <template <class> class Method>
+void expect_nothing_of_steps_before() {
+  const auto system = sample::forced_se3<Pack<double, 4>>();
+  const auto members = members_of(sample::forced_se3(), 5);
+  Method<std::remove_const_t<decltype(system)>> used;
+  auto state = sample::generic_state(system);
+  for (int k = 0; k < 3; ++k) used.do_step(system, state, 0, 0.1);
+  Ensemble after(system, used, 0.0, step, std::span(members));
+  Ensemble anew(system, decltype(used){}, 0.0, step, std::span(members));
+  after.advance(steps);
+  anew.advance(steps);
+  for (std::size_t k = 0; k < 5; ++k) EXPECT_EQ(after.state(k), anew.state(k));
+}
+
+TEST(Ensembles, of_a_method_that_took_steps_begin_anew) {
+  expect_nothing_of_steps_before<Rk4>();
+  expect_nothing_of_steps_before<Splitting2>();
+}
+
 template <class System>
 using Open2 = hamotor::Splitting2<System, hamotor::Summation::plain>;
 template <class System>

@@ -167,6 +167,16 @@ class LowDigits {
     return worst;
   }
 
+  /// Forgets the digits where a condition does not hold: there, they were of another state.
+  template <class Condition>
+  constexpr void keep_where(const Condition& condition) noexcept {
+    if constexpr (summation == Summation::compensated) {
+      if (all(condition)) return;
+      for (auto& motor : kept_.motors) motor = select_each(condition, motor, {});
+      for (auto& momentum : kept_.momenta) momentum = select_each(condition, momentum, {});
+    }
+  }
+
  private:
   struct Nothing {};
   [[no_unique_address]] std::conditional_t<summation == Summation::compensated, ChangeOf<System>,

@@ -108,6 +108,12 @@ template <class Method>
   requires requires { Method::carries_state; }
 inline constexpr bool carries_state<Method> = Method::carries_state;
 
+/// Whether a method has steps that do not look whether the state is the one that the last step
+/// left.
+template <class Method, class System>
+concept goes_on = requires(Method method, const System& system, StateOf<System>& state,
+                           const typename System::Scalar& t) { method.go_on(system, state, t, t); };
+
 /// Members of a system under way.
 ///
 /// `Systems` gives the system of a block, in which each lane may have parameters of its own.  With
@@ -137,6 +143,7 @@ class Ensemble {
     for (std::size_t k = 0; k < bundles_.size() * in_bundle; ++k) {
       Block& block = block_of(k);
       block.method = method;
+      if constexpr (requires { block.method.forget(); }) block.method.forget();
       detail::merge(block.state, members[std::min(k, members.size() - 1)],
                     [&](Scalar& to, const Number& from) { detail::set_lane(to, k % lanes, from); });
     }
@@ -309,13 +316,17 @@ class Ensemble {
         } else {
           for (std::int64_t k = 0; k < steps; ++k) {
             const Scalar t = now(index + k);
-            (blocks[g].method.do_step(plans[g], blocks[g].state, t), ...);
+            (blocks[g].method.go_on(plans[g], blocks[g].state, t), ...);
           }
         }
       } else {
         for (std::int64_t k = 0; k < steps; ++k) {
           const Scalar t = now(index + k);
-          (blocks[g].method.do_step(systems[g], blocks[g].state, t, h), ...);
+          if constexpr (goes_on<Method, System>) {
+            (blocks[g].method.go_on(systems[g], blocks[g].state, t, h), ...);
+          } else {
+            (blocks[g].method.do_step(systems[g], blocks[g].state, t, h), ...);
+          }
         }
       }
     }(std::make_index_sequence<in_turn>{});

@@ -82,7 +82,9 @@ class Gauss {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
-    if (foresees_ && failure_ == Failure::none && h == h_ && state == end_) {
+    const bool goes_on = state == end_;
+    if (!goes_on) forget();
+    if (goes_on && foresees_ && failure_ == Failure::none && h == h_) {
       foresee();
     } else {
       stay(system, state, t);
@@ -138,6 +140,19 @@ class Gauss {
     detail::StageEquations<S, stages, unknowns> equations{};
     [[no_unique_address]] std::conditional_t<has_whole, Whole, NoWhole> all{};
   };
+
+  /// The next step is from another state: what was lost of the last one, and how it was solved, is
+  /// nothing to it.
+  constexpr void forget() noexcept {
+    low_ = {};
+    if constexpr (has_newton) {
+      newton_.on = false;
+      newton_.whole = false;
+      newton_.whole_for = 0;
+      newton_.stale = false;
+      newton_.iterations = 0;
+    }
+  }
 
   /// The first guess where nothing is known: what is at the start.
   constexpr void stay(const System& system, const StateOf<System>& state, const S& t) noexcept {

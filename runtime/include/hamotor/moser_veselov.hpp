@@ -410,7 +410,7 @@ class MoserVeselov {
     }
     if (!(set_up_for_ == h && (order == 2 || goes_on))) set_up(system, state, h);
     bool found = true;
-    splitting_.do_step(Stepped(system, rotations_, found), state, t, h);
+    splitting_.go_on(Stepped(system, rotations_, found), state, t, h);
     if (!found) {
       failure_ = Failure::no_convergence;
       for (auto& momentum : state.momenta) momentum = (S(0) / S(0)) * momentum;

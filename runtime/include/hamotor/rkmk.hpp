@@ -158,6 +158,7 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
+    this->take_up(state);
     h_ = h;
     known_ = 0;
     find_slopes(system, state, t, stages);
@@ -167,6 +168,7 @@ class ExplicitPair : public detail::ExplicitMethod<System, summation> {
     } else {
       this->turn(state, S(1), sum.forces, sum.power, sum.motors);
     }
+    this->leave(state);
     error_ = error_of(state, combined(table.error));
   }
 
@@ -338,6 +340,7 @@ class CommutatorFree4 : public detail::ExplicitMethod<System, summation> {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
+    this->take_up(state);
     const S half = S(0.5) * h;
     const Slope one = detail::slope_of(system, state, t);
     StateOf<System> there = moved(state, half, one);
@@ -361,6 +364,7 @@ class CommutatorFree4 : public detail::ExplicitMethod<System, summation> {
     }
     this->turn(state, h / S(6), forces, mean(one.power, two.power, three.power, four.power), first,
                second);
+    this->leave(state);
   }
 
  private:

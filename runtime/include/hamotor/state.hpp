@@ -33,6 +33,35 @@ struct State {
   [[nodiscard]] friend constexpr bool operator==(const State&, const State&) = default;
 };
 
+/// Where two states have the same numbers: of packs, in which lanes.
+template <class G, std::size_t N, class S>
+[[nodiscard]] constexpr auto are_same(const State<G, N, S>& a, const State<G, N, S>& b) noexcept {
+  auto same = S(0) == S(0);
+  if constexpr (std::same_as<decltype(same), bool>) {
+    same = a == b;
+  } else {
+    const auto compare = [&](const auto& x, const auto& y) {
+      const auto one = x.components();
+      const auto other = y.components();
+      for (std::size_t k = 0; k < one.size(); ++k) same = same && one[k] == other[k];
+    };
+    for (std::size_t i = 0; i < N; ++i) {
+      compare(a.motors[i], b.motors[i]);
+      compare(a.momenta[i], b.momenta[i]);
+    }
+  }
+  return same;
+}
+
+/// The components of `a` in the lanes where a condition holds, else those of `b`.
+template <class Condition, class T>
+[[nodiscard]] constexpr T select_each(const Condition& condition, const T& a, const T& b) noexcept {
+  auto x = a.components();
+  const auto y = b.components();
+  for (std::size_t k = 0; k < x.size(); ++k) x[k] = select(condition, x[k], y[k]);
+  return T::from(x);
+}
+
 /// Whether every number of a state is finite: one multiply-add for each (0·∞ and 0·NaN are NaN).
 template <class G, std::size_t N, class S>
 [[nodiscard]] constexpr auto is_finite(const State<G, N, S>& state) noexcept {

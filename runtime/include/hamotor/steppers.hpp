@@ -30,13 +30,6 @@ template <class Rate, class S>
   return mul_add(half, once, mul_add(S(1) / S(12), ad(x, once), b));
 }
 
-/// Whether a state is compared with the one that a step ended with.  Packs are not: an ensemble
-/// changes no state between steps.
-template <class S>
-inline constexpr bool is_compared = requires {
-  { S(0) == S(0) } -> std::same_as<bool>;
-};
-
 /// Whether spins commute with everything else in a system and are left to the end of a step.
 template <class System>
 inline constexpr bool has_spin_apart = false;
@@ -129,9 +122,11 @@ class ExplicitMethod {
   /// Whether sums over steps are compensated.
   static constexpr bool compensated = summation == Summation::compensated;
 
-  /// What is carried from step to step.
+  struct Nothing {};
+  /// What is carried from step to step; `left` is the state that the last one left.
   struct Account {
     [[no_unique_address]] LowDigits<System, summation> low;
+    [[no_unique_address]] std::conditional_t<compensated, StateOf<System>, Nothing> left{};
     Drift<S> drift;
     S work{};
   };
@@ -156,6 +151,16 @@ class ExplicitMethod {
   constexpr void forget() noexcept { account_.low = {}; }
 
  protected:
+  /// Before a step from this state: what sums lost of others is nothing to it.
+  constexpr void take_up([[maybe_unused]] const StateOf<System>& state) noexcept {
+    if constexpr (compensated) account_.low.keep_where(are_same(state, account_.left));
+  }
+
+  /// After a step to this state.
+  constexpr void leave([[maybe_unused]] const StateOf<System>& state) noexcept {
+    if constexpr (compensated) account_.left = state;
+  }
+
   /// Multiplies motors by exp X, for each X in turn, and adds `by` times what pushes the momenta
   /// and works.
   template <std::same_as<Rates>... X>
@@ -279,6 +284,7 @@ class Rkmk4 : public detail::ExplicitMethod<System, summation> {
   /// Takes `state` from t to t + h.  Flat: a slope that is called returns through memory.
   [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                                           const S& h) noexcept {
+    this->take_up(state);
     const S half_step = S(0.5) * h;
     const Slope one = slope(system, state, t, Rates{});
     const Slope two = slope_at(system, state, t, half_step, one);
@@ -292,6 +298,7 @@ class Rkmk4 : public detail::ExplicitMethod<System, summation> {
       force[i] = mean(one.force[i], two.force[i], three.force[i], four.force[i]);
     }
     this->turn(state, h / S(6), force, mean(one.power, two.power, three.power, four.power), x);
+    this->leave(state);
   }
 
  private:
@@ -603,6 +610,24 @@ class WorldStages {
     return result;
   }
 
+  /// `a` in the lanes where a condition holds, else `b`.
+  template <class Condition>
+  [[nodiscard]] static constexpr Carried selected(const Condition& condition, const Carried& a,
+                                                  Carried b) noexcept {
+    const auto keep = [&](const auto& from, auto& to) {
+      for (std::size_t i = 0; i < n; ++i) {
+        for (std::size_t k = 0; k < to[i].size(); ++k) {
+          to[i][k] = select(condition, from[i][k], to[i][k]);
+        }
+      }
+    };
+    keep(a.attitudes, b.attitudes);
+    keep(a.angular, b.angular);
+    keep(a.positions, b.positions);
+    keep(a.velocities, b.velocities);
+    return b;
+  }
+
   /// A step, and how far each body's left the group.
   [[nodiscard]] HAMOTOR_INLINE constexpr std::array<S, n> step(Carried& at) const noexcept {
     note_evaluations<S>(4);
@@ -762,6 +787,19 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   /// The same by a plan for h.  Flat: a slope that is called returns through memory.
   [[gnu::flatten]] constexpr void do_step(const Plan& plan, StateOf<System>& state,
                                           const S& t) noexcept {
+    take_up(plan, state);
+    go_on(plan, state, t);
+    if constexpr (carries_state) {
+      known_.state = state;
+    } else {
+      this->leave(state);
+    }
+  }
+
+  /// The same for who changes no state between steps, which is then not compared; other steps may
+  /// follow after `forget`.
+  [[gnu::flatten]] constexpr void go_on(const Plan& plan, StateOf<System>& state,
+                                        const S& t) noexcept {
     if constexpr (carries_state) {
       open(plan, state);
       do_open_step(plan);
@@ -784,11 +822,11 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
     }
   }
 
-  /// Takes up a state, if it is not the one that the last step ended with.
+  /// Takes up a state, the first one; later ones are known.
   constexpr void open(const Plan& plan, const StateOf<System>& state) noexcept
     requires(carries_state)
   {
-    if (is_known(state)) return;
+    if (known_.any) return;
     known_.carried = plan.stages_.carried(state);
     known_.any = true;
   }
@@ -801,12 +839,10 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   }
 
   /// The state after the steps so far.
-  [[nodiscard]] constexpr StateOf<System> closed(const Plan& plan) noexcept
+  [[nodiscard]] constexpr StateOf<System> closed(const Plan& plan) const noexcept
     requires(carries_state)
   {
-    const StateOf<System> state = plan.stages_.state(known_.carried);
-    if constexpr (detail::is_compared<S>) known_.state = state;
-    return state;
+    return plan.stages_.state(known_.carried);
   }
 
   /// The next step is from another state.
@@ -820,16 +856,19 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
   template <class Carrying>
   struct Known {
     typename Carrying::Carried carried{};
-    [[no_unique_address]] std::conditional_t<detail::is_compared<S>, StateOf<System>, Nothing>
-        state{};
+    StateOf<System> state{};  ///< that the last step of a run left
     bool any = false;
   };
 
-  [[nodiscard]] constexpr bool is_known(const StateOf<System>& state) const noexcept {
-    if constexpr (detail::is_compared<S>) {
-      return known_.any && known_.state == state;
+  /// Takes up a state in the lanes in which it is not the one that the last step left.
+  constexpr void take_up([[maybe_unused]] const Plan& plan, const StateOf<System>& state) noexcept {
+    if constexpr (carries_state) {
+      const auto same = are_same(state, known_.state);
+      if (!any(same)) known_.any = false;
+      if (!known_.any || all(same)) return;
+      known_.carried = Stages::selected(same, known_.carried, plan.stages_.carried(state));
     } else {
-      return known_.any;
+      Base::take_up(state);
     }
   }
 
@@ -844,12 +883,11 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
 /// or a kick: Casimirs of free bodies and the spatial momentum are constant but for rounding,
 /// whatever the step, and the energy error is bounded.  With compensated sums a rounding error is
 /// relative to the change in a part of a step instead of to the state.  A forque at the end of a
-/// step is kept for the start of the next.
+/// step is kept for the start of the next; where that is of another state, it starts anew.
 template <SplitSystem System, int nominal_order, Summation summation = Summation::compensated>
 class Splitting {
   using S = typename System::Scalar;
   using G = typename System::Group;
-  using Motors = decltype(StateOf<System>::motors);
   using Momenta = decltype(StateOf<System>::momenta);
   using Scheme = detail::SchemeOf<System, nominal_order>;
   static constexpr std::size_t n = System::bodies;
@@ -868,8 +906,17 @@ class Splitting {
   static constexpr std::size_t turns = 2 * stages;
 
   /// Takes `state` from t to t + h.
-  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state,
-                                          const S& /*t*/, const S& h) noexcept {
+  [[gnu::flatten]] constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
+                                          const S& h) noexcept {
+    if constexpr (keeps_any) take_up(system, state);
+    go_on(system, state, t, h);
+    if constexpr (keeps_any) left_ = state;
+  }
+
+  /// The same for who changes no state between steps, which is then not compared; other steps may
+  /// follow after `forget`.
+  [[gnu::flatten]] constexpr void go_on(const System& system, StateOf<System>& state,
+                                        const S& /*t*/, const S& h) noexcept {
     if constexpr (takes_whole_steps) {
       if constexpr (System::has_forque) note_evaluations<S>(static_cast<int>(stages));
       add(state, system.split_step(state.motors, state.momenta, h, weights));
@@ -899,7 +946,7 @@ class Splitting {
         }
       };
       if constexpr (opens_with_kick) {
-        if (!is_known_at(state.motors)) find_forque(state.motors);
+        if (!known_.any) find_forque(state.motors);
         kick(weights.kicks[0]);
       }
       for (std::size_t k = 0; k < stages; ++k) {
@@ -916,10 +963,7 @@ class Splitting {
         }
       }
       add(state, change);
-      if constexpr (System::has_forque) {
-        known_.any = opens_with_kick;
-        known_.at = state.motors;
-      }
+      if constexpr (opens_with_kick) known_.any = true;
     }
   }
 
@@ -990,9 +1034,9 @@ class Splitting {
 
  private:
   struct Nothing {};
+  struct NothingLeft {};
   struct KnownForque {
     bool any = false;
-    Motors at{};
     Momenta forque{};
   };
   static constexpr bool takes_whole_steps = detail::takes_split_steps<System>;
@@ -1000,11 +1044,25 @@ class Splitting {
   static constexpr bool opens_with_kick =
       System::has_forque && detail::rounded_weights<double, Scheme>().kicks[0] > 0;
 
-  [[nodiscard]] constexpr bool is_known_at(const Motors& motors) const noexcept {
-    if constexpr (detail::is_compared<S>) {
-      return known_.at == motors && known_.any;
-    } else {
-      return known_.any;
+  /// Whether anything is kept of the state that a step leaves.
+  static constexpr bool keeps_any = compensated || (opens_with_kick && !takes_whole_steps);
+
+  /// Forgets what is kept in the lanes in which a state is not the one that the last step left.
+  constexpr void take_up(const System& system, const StateOf<System>& state) noexcept {
+    const auto same = are_same(state, left_);
+    if (all(same)) return;
+    if constexpr (compensated) {
+      for (auto& low : low_.motors) low = select_each(same, low, {});
+      for (auto& low : low_.momenta) low = select_each(same, low, {});
+    }
+    if constexpr (System::has_forque) {
+      if (!any(same)) known_.any = false;
+      if (!known_.any) return;
+      note_evaluations<S>(1);
+      const Momenta anew = system.forque(state.motors);
+      for (std::size_t i = 0; i < n; ++i) {
+        known_.forque[i] = select_each(same, known_.forque[i], anew[i]);
+      }
     }
   }
 
@@ -1046,6 +1104,7 @@ class Splitting {
 
   [[no_unique_address]] std::conditional_t<System::has_forque, KnownForque, Nothing> known_;
   [[no_unique_address]] std::conditional_t<compensated, ChangeOf<System>, Nothing> low_{};
+  [[no_unique_address]] std::conditional_t<keeps_any, StateOf<System>, NothingLeft> left_{};
   Drift<S> drift_;
   unsigned open_steps_ = 0;
 };
