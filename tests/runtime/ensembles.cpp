@@ -103,6 +103,19 @@ TEST(Ensembles, members_have_the_same_bits_in_any_lane_part_and_thread) {
   EXPECT_EQ(hash_in<Rk4>(eight, members, 3, 2), alone);
 }
 
+TEST(Ensembles, of_32_lanes_have_the_same_bits_and_failures) {
+  const auto members = members_of(sample::forced_so3(), count);
+  const auto system = sample::forced_so3<Pack<double, 32>>();
+  const auto one = sample::forced_so3<Pack<double, 1>>();
+  EXPECT_EQ(hash_in<Rk4>(system, members, 1, 1), hash_in<Rk4>(one, members, 1, 1));
+  auto failing = members;
+  failing[31].momenta[0].l31 = std::numeric_limits<double>::quiet_NaN();
+  Ensemble ensemble(system, Rk4<std::remove_const_t<decltype(system)>>{}, 0.0, step,
+                    std::span(failing));
+  EXPECT_EQ(ensemble.advance(steps), count - 1);
+  EXPECT_EQ(ensemble.failure(31), Failure::not_finite);
+}
+
 TEST(Ensembles, angles_of_any_size_have_the_same_bits_in_any_lane) {
   const auto members = members_of(sample::forced_so3(), count, 1e3);
   const auto alone = hash_in<Splitting2>(sample::forced_so3<Pack<double, 1>>(), members, 1, 1);
@@ -291,6 +304,37 @@ TEST(Packs, a_product_is_taken_away_with_the_rounding_of_a_number) {
   expect_a_number_s_less_product<float, 16>();
   expect_a_number_s_less_product<float, 8>();
   expect_a_number_s_less_product<float, 4>();
+}
+
+template <class S, std::size_t W>
+void expect_masks_of_all_lanes() {
+  using P = Pack<S, W>;
+  EXPECT_TRUE(all(P(1) == P(1)));
+  EXPECT_FALSE(any(P(1) == P(2)));
+  for (std::size_t lane = 0; lane < W; ++lane) {
+    P x(1);
+    x.set(lane, S(2));
+    EXPECT_TRUE(any(x == P(2))) << lane << " of " << W;
+    EXPECT_FALSE(all(x == P(1))) << lane << " of " << W;
+    EXPECT_EQ(select(x == P(2), P(3), x)[lane], 3);
+    EXPECT_EQ(sqrt(x * x)[lane], 2);
+  }
+}
+
+template <class S>
+void expect_packs_of_any_size() {
+  expect_masks_of_all_lanes<S, 1>();
+  expect_masks_of_all_lanes<S, 2>();
+  expect_masks_of_all_lanes<S, 4>();
+  expect_masks_of_all_lanes<S, 8>();
+  expect_masks_of_all_lanes<S, 16>();
+  expect_masks_of_all_lanes<S, 32>();
+  expect_masks_of_all_lanes<S, 64>();
+}
+
+TEST(Packs, know_all_of_up_to_64_lanes) {
+  expect_packs_of_any_size<double>();
+  expect_packs_of_any_size<float>();
 }
 
 TEST(Packs, masks_choose_lane_by_lane) {

@@ -30,11 +30,11 @@ namespace hamotor {
 template <class T, std::size_t W>
 class Mask;
 
-/// W numbers of type T (float or double); W is a power of two.
+/// W numbers of type T (float or double); W is a power of two, at most 64.
 template <class T, std::size_t W>
 class Pack {
   static_assert(std::same_as<T, float> || std::same_as<T, double>);
-  static_assert(std::has_single_bit(W));
+  static_assert(std::has_single_bit(W) && W <= 64);  // as many as a mask has bits
 
  public:
   using Number = T;
@@ -328,10 +328,11 @@ class Mask {
   }
 
  private:
-  static constexpr unsigned every = (1U << W) - 1;
+  using Bits = std::conditional_t<(W < 32), unsigned, std::uint64_t>;
+  static constexpr Bits every = static_cast<Bits>(~std::uint64_t{0} >> (64 - W));
 
   /// A bit for each lane.
-  [[nodiscard]] HAMOTOR_INLINE constexpr unsigned bits() const noexcept {
+  [[nodiscard]] HAMOTOR_INLINE constexpr Bits bits() const noexcept {
     if constexpr (W == 1) {
       return lanes_ ? 1 : 0;
     } else {
@@ -339,7 +340,7 @@ class Mask {
       if (!std::is_constant_evaluated()) {
 #ifdef __AVX512DQ__
         if constexpr (W == 8 && sizeof(T) == 8) return _mm512_movepi64_mask(vector<__m512i>());
-        if constexpr (W == 16) return _mm512_movepi32_mask(vector<__m512i>());
+        if constexpr (W == 16 && sizeof(T) == 4) return _mm512_movepi32_mask(vector<__m512i>());
 #endif
         if constexpr (W == 4 && sizeof(T) == 8) return low(_mm256_movemask_pd(vector<__m256d>()));
         if constexpr (W == 2 && sizeof(T) == 8) return low(_mm_movemask_pd(vector<__m128d>()));
@@ -347,8 +348,8 @@ class Mask {
         if constexpr (W == 4 && sizeof(T) == 4) return low(_mm_movemask_ps(vector<__m128>()));
       }
 #endif
-      unsigned result = 0;
-      for (std::size_t k = 0; k < W; ++k) result |= lanes_[k] != 0 ? 1U << k : 0U;
+      Bits result = 0;
+      for (std::size_t k = 0; k < W; ++k) result |= lanes_[k] != 0 ? Bits{1} << k : Bits{0};
       return result;
     }
   }

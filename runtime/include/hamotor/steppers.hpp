@@ -789,10 +789,10 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
                                           const S& t) noexcept {
     take_up(plan, state);
     go_on(plan, state, t);
-    if constexpr (carries_state) {
-      known_.state = state;
-    } else {
+    if constexpr (!carries_state) {
       this->leave(state);
+    } else if constexpr (keeps_left) {
+      known_.left = state;
     }
   }
 
@@ -853,17 +853,26 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
 
  private:
   struct Nothing {};
+  /// Whether the state that the last step left is kept.  That of packs is found again for a run, so
+  /// that ensembles, which need none, have less to store.
+  static constexpr bool keeps_left = std::same_as<decltype(S(0) == S(0)), bool>;
   template <class Carrying>
   struct Known {
     typename Carrying::Carried carried{};
-    StateOf<System> state{};  ///< that the last step of a run left
+    [[no_unique_address]] std::conditional_t<keeps_left, StateOf<System>, Nothing> left{};
     bool any = false;
   };
 
   /// Takes up a state in the lanes in which it is not the one that the last step left.
   constexpr void take_up([[maybe_unused]] const Plan& plan, const StateOf<System>& state) noexcept {
     if constexpr (carries_state) {
-      const auto same = are_same(state, known_.state);
+      const auto same = [&] {
+        if constexpr (keeps_left) {
+          return are_same(state, known_.left);
+        } else {
+          return are_same(state, closed(plan));
+        }
+      }();
       if (!any(same)) known_.any = false;
       if (!known_.any || all(same)) return;
       known_.carried = Stages::selected(same, known_.carried, plan.stages_.carried(state));
