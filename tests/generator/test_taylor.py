@@ -465,6 +465,14 @@ def test_time_runs_backwards(problems: Callable[[str], Any]) -> None:
         assert np.abs(run.state() - start).max() < 1e-12
 
 
+def test_a_step_without_an_end_fails(problems: Callable[[str], Any]) -> None:
+    library, start, _ = problems("P4")
+    for step in (np.inf, -np.inf, np.nan):
+        with library.start("taylor", step=step, state=start) as run:
+            assert run.advance(1, 0, None) == 0
+            assert run.failure()[0] == Failure.NOT_FINITE
+
+
 def test_tighter_tolerances_take_higher_orders_not_many_more_steps(
     problems: Callable[[str], Any],
 ) -> None:

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -370,6 +371,25 @@ TEST(Adaptive, asks_no_step_for_less_than_rounding) {
   impossible.do_step(system, same, 0, 1);
   EXPECT_LT(distance(same, state), 1e-13);
   EXPECT_LT(impossible.tried(), 10 * fine.tried());
+}
+
+TEST(Adaptive, says_where_a_time_is_none) {
+  const auto system = sample::forced_so3();
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  for (const double h : {infinity, -infinity, std::numeric_limits<double>::quiet_NaN()}) {
+    Adaptive<std::remove_const_t<decltype(system)>> method(1e-6);
+    const auto start = generic_state(system);
+    auto state = start;
+    method.do_step(system, state, 0, h);
+    EXPECT_EQ(method.failure(), hamotor::Failure::not_finite) << h;
+    EXPECT_FALSE(is_finite(state)) << h;
+    state = start;
+    method.do_step(system, state, 0, 0.1);
+    EXPECT_EQ(method.failure(), hamotor::Failure::none) << h;
+    auto expected = start;
+    decltype(method)(1e-6).do_step(system, expected, 0, 0.1);
+    EXPECT_EQ(state, expected) << h;
+  }
 }
 
 TEST(Adaptive, goes_on_to_the_same_bits_from_where_its_patience_ended) {

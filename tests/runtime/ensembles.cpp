@@ -103,6 +103,17 @@ TEST(Ensembles, members_have_the_same_bits_in_any_lane_part_and_thread) {
   EXPECT_EQ(hash_in<Rk4>(eight, members, 3, 2), alone);
 }
 
+TEST(Ensembles, take_no_steps_where_there_are_fewer_than_none) {
+  const auto system = sample::forced_so3<Pack<double, 4>>();
+  const auto members = members_of(sample::forced_so3(), 3);
+  Ensemble ensemble(system, Rk4<std::remove_const_t<decltype(system)>>{}, 0.5, step,
+                    std::span(members));
+  EXPECT_EQ(ensemble.advance(-7), 3U);
+  EXPECT_EQ(ensemble.time(0), 0.5);
+  EXPECT_EQ(ensemble.steps(0), 0);
+  EXPECT_EQ(ensemble.state(0), members[0]);
+}
+
 TEST(Ensembles, of_32_lanes_have_the_same_bits_and_failures) {
   const auto members = members_of(sample::forced_so3(), count);
   const auto system = sample::forced_so3<Pack<double, 32>>();

@@ -54,6 +54,11 @@ class Adaptive {
       ++taken_;
       return;
     }
+    if (!((t + h) - (t + h) == S(0))) {  // no step would reach such a time, nor miss it
+      failure_ = Failure::not_finite;
+      for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
+      return;
+    }
     reach(system, state, t, h, t + h);
   }
 

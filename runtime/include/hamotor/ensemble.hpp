@@ -155,8 +155,10 @@ class Ensemble {
     }
   }
 
-  /// Every member that is alive takes so many steps; how many still are.
+  /// Every member that is alive takes so many steps, none where there are fewer than 0: back goes
+  /// an ensemble of a negative step.  How many still are alive.
   std::size_t advance(std::int64_t steps) {
+    steps = std::max<std::int64_t>(steps, 0);
     const std::size_t workers = std::min<std::size_t>(threads_, bundles_.size());
     if (workers > 0) {
       // In pieces, which whoever is free takes: cores are not equally fast, nor left alone.

@@ -103,6 +103,7 @@ class Taylor {
   constexpr void do_step(const System& /*system*/, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
     failure_ = Failure::none;
+    if (!((t + h) - (t + h) == S(0))) return fail(state, Failure::not_finite);
     const bool goes_on = known_ && state == delivered_ && is_near(t, time_, h);
     if (!goes_on || (paused_ && h != asked_)) start(state, t);
     if (!paused_) offset_ = offset_ + h;
