@@ -108,12 +108,6 @@ template <class Method>
   requires requires { Method::carries_state; }
 inline constexpr bool carries_state<Method> = Method::carries_state;
 
-/// Whether a method has steps that do not look whether the state is the one that the last step
-/// left.
-template <class Method, class System>
-concept goes_on = requires(Method method, const System& system, StateOf<System>& state,
-                           const typename System::Scalar& t) { method.go_on(system, state, t, t); };
-
 /// Members of a system under way.
 ///
 /// `Systems` gives the system of a block, in which each lane may have parameters of its own.  With
@@ -324,11 +318,7 @@ class Ensemble {
       } else {
         for (std::int64_t k = 0; k < steps; ++k) {
           const Scalar t = now(index + k);
-          if constexpr (goes_on<Method, System>) {
-            (blocks[g].method.go_on(systems[g], blocks[g].state, t, h), ...);
-          } else {
-            (blocks[g].method.do_step(systems[g], blocks[g].state, t, h), ...);
-          }
+          (go_on(blocks[g].method, systems[g], blocks[g].state, t, h), ...);
         }
       }
     }(std::make_index_sequence<in_turn>{});

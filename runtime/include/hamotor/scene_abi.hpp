@@ -686,7 +686,7 @@ class Run {
             }
           }
           auto aside = unhurried(method);
-          aside.do_step(Scene::system, there.state, now(), part);
+          go_on(aside, Scene::system, there.state, now(), part);
           there.work = work_of(aside);
           return observe(there, row);
         },
@@ -731,7 +731,7 @@ class Run {
     StateOf<System> state = state_;
     for (std::int64_t done = 0; done < steps; ++done) {
       [[maybe_unused]] const auto before = if_eventful(method);
-      method.do_step(Scene::system, state, now(), step_);
+      go_on(method, Scene::system, state, now(), step_);
       if constexpr (Patient<Method>) {
         if (method.paused()) return done;
       }
@@ -812,7 +812,7 @@ class Run {
                             values_after[k]);
       Method method = before;
       StateOf<System> state = state_;
-      method.do_step(Scene::system, state, start, part);
+      go_on(method, Scene::system, state, start, part);
       moments_[k] = {start + part, state, work_of(method)};
     }
     return any;

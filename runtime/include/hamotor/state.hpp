@@ -296,6 +296,19 @@ concept Stepper = HamiltonianSystem<System> && std::default_initializable<Method
                     { method.drift() } -> std::convertible_to<Drift<typename System::Scalar>>;
                   };
 
+/// A step of who changes no state between steps: steppers that would look whether it is the one
+/// that their last step left do not.
+template <class System, Stepper<System> Method>
+HAMOTOR_INLINE constexpr void go_on(Method& method, const System& system, StateOf<System>& state,
+                                    const typename System::Scalar& t,
+                                    const typename System::Scalar& h) noexcept {
+  if constexpr (requires { method.go_on(system, state, t, h); }) {
+    method.go_on(system, state, t, h);
+  } else {
+    method.do_step(system, state, t, h);
+  }
+}
+
 /// A stepper that can choose the steps within a `do_step` itself, by an estimate of their error.
 ///
 /// `set_tolerance(e)` asks for a local error of at most e per unit of time, s⁻¹, of a motor's

@@ -798,6 +798,10 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
 
   /// The same for who changes no state between steps, which is then not compared; other steps may
   /// follow after `forget`.
+  constexpr void go_on(const System& system, StateOf<System>& state, const S& t,
+                       const S& h) noexcept {
+    go_on(Plan(system, h), state, t);
+  }
   [[gnu::flatten]] constexpr void go_on(const Plan& plan, StateOf<System>& state,
                                         const S& t) noexcept {
     if constexpr (carries_state) {
