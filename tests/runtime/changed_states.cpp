@@ -92,14 +92,11 @@ void expect_of_all_methods(const auto& system) {
 }
 
 TEST(ChangedStates, of_free_bodies_have_the_bits_of_a_new_stepper_by_every_method) {
-  expect_of_all_methods(sample::free_so3());
   expect_of_all_methods(sample::free_se2());
 }
 
 TEST(ChangedStates, of_bodies_with_forces_have_the_bits_of_a_new_stepper_by_every_method) {
   expect_of_all_methods(sample::forced_so3());
-  expect_of_all_methods(sample::forced_se3());
-  expect_of_all_methods(sample::two_bodies_se2());
 }
 
 template <class S, std::size_t W, class Lanes, class Numbers>
@@ -176,26 +173,21 @@ struct Summed {
   using Splitting2 = hamotor::Splitting<System, 2, summation>;
   template <class System>
   using Splitting4 = hamotor::Splitting<System, 4, summation>;
-  template <class System>
-  using Splitting6 = hamotor::Splitting<System, 6, summation>;
 };
-template <class S, std::size_t W>
+template <Summation summation, std::size_t W>
 void expect_of_methods_in_packs(const auto& make) {
-  const auto check = [&]<Summation summation> {
-    expect_lanes_of_their_own<Summed<summation>::template Rk4, S, W>(make);
-    expect_lanes_of_their_own<Summed<summation>::template Splitting2, S, W>(make);
-    expect_lanes_of_their_own<Summed<summation>::template Splitting4, S, W>(make);
-    expect_lanes_of_their_own<Summed<summation>::template Splitting6, S, W>(make);
-  };
-  check.template operator()<Summation::plain>();
-  check.template operator()<Summation::compensated>();
+  expect_lanes_of_their_own<Summed<summation>::template Rk4, double, W>(make);
+  expect_lanes_of_their_own<Summed<summation>::template Splitting2, double, W>(make);
+  expect_lanes_of_their_own<Summed<summation>::template Splitting4, double, W>(make);
 }
 
 TEST(ChangedStates, of_a_lane_leave_the_others_alone) {
-  expect_of_methods_in_packs<double, 4>([]<class S> { return sample::forced_so3<S>(); });
-  expect_of_methods_in_packs<double, 8>([]<class S> { return sample::forced_se3<S>(); });
-  expect_of_methods_in_packs<double, 2>([]<class S> { return sample::two_bodies_se2<S>(); });
-  expect_of_methods_in_packs<double, 1>([]<class S> { return sample::free_se3<S>(); });
+  constexpr auto plain = Summation::plain;
+  constexpr auto compensated = Summation::compensated;
+  expect_of_methods_in_packs<compensated, 4>([]<class S> { return sample::forced_so3<S>(); });
+  expect_of_methods_in_packs<plain, 8>([]<class S> { return sample::forced_se3<S>(); });
+  expect_of_methods_in_packs<compensated, 2>([]<class S> { return sample::two_bodies_se2<S>(); });
+  expect_of_methods_in_packs<plain, 1>([]<class S> { return sample::free_se3<S>(); });
 }
 
 TEST(ChangedStates, of_a_lane_leave_the_others_alone_in_packs_of_any_size) {
