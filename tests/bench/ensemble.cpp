@@ -184,7 +184,8 @@ template <std::size_t multiply_adds, std::size_t additions>
   constexpr int rounds = 20000;
   constexpr std::size_t chains = multiply_adds + additions;
   std::array<Lanes, chains> numbers;
-  numbers.fill(Lanes(0));
+  const volatile double zero = 0;  // of what the compiler knows nothing would be left to do
+  numbers.fill(Lanes(static_cast<double>(zero)));
   const double taken = shortest(10, [&] {
     [&]<std::size_t... k>(std::index_sequence<k...>) {
       std::tuple local{numbers[k]...};
