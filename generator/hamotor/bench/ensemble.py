@@ -61,15 +61,17 @@ def bench_ensemble(
     compilers = compilers_here()
     say(f"building with {' and '.join(compilers)}")
     programs = {c: build_program(c, "ensemble", quick=True) for c in compilers}
-    rows: list[dict[str, Any]] = []
-    machine: dict[str, Any] = {}
+    found = {}
     for compiler, program in programs.items():
         say(f"timing, {compiler}")
-        said = json_text.loads(run_tool(str(program), *(["--quick"] if quick else [])))
-        rows += account_rows(said, compiler)
-        peak = max(said["peak_flops"], machine.get("peak_flops", 0.0))
-        machine = {**{k: said[k] for k in ("lanes", "isa", "cores")}, "peak_flops": peak}
-        angular = said["angular"]
+        found[compiler] = json_text.loads(run_tool(str(program), *(["--quick"] if quick else [])))
+    rows = account_rows(found)
+    said = next(iter(found.values()))
+    machine = {
+        **{k: said[k] for k in ("lanes", "isa", "cores")},
+        "peak_flops": max(x["peak_flops"] for x in found.values()),
+    }
+    angular = said["angular"]
     gaps: dict[str, str] = {}
     versions = peers_here(gaps)
     rows += peer_rows(versions, angular, gaps, quick=quick)
@@ -87,22 +89,38 @@ def bench_ensemble(
     return account
 
 
-def account_rows(said: Mapping[str, Any], compiler: str) -> list[dict[str, Any]]:
-    """What one program measured.  CheckFailed if its contestants do not do the same."""
-    if not said["disagreement"] <= AGREEMENT:
-        raise CheckFailed(
-            f"hamotor bench: Eigen's bodies differ from ours by {said['disagreement']:.2g} of their"
-            " angular momentum after a second; they cannot be compared"
-        )
+def account_rows(found: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """What the program of each compiler measured.
+
+    CheckFailed if its contestants do not do the same.
+    """
     rows = []
-    for row in said["rows"]:
-        peak = row["peak_flops"] * row["threads"]
-        shares = {
-            "share_of_peak": row["steps_per_second"] * row["flops_per_step"] / peak,
-            "bound": bound(row),
-        }
-        rows.append({**row, "compiler": compiler, **shares})
-    return rows
+    for compiler, said in found.items():
+        if not said["disagreement"] <= AGREEMENT:
+            raise CheckFailed(
+                f"hamotor bench: Eigen's bodies differ from ours by {said['disagreement']:.2g} of "
+                "their angular momentum after a second; they cannot be compared"
+            )
+        rows += [{**row, "compiler": compiler} for row in said["rows"]]
+    return [_shares(row | _least_counts(row, rows)) for row in rows]
+
+
+def _least_counts(row: Mapping[str, Any], rows: Rows) -> dict[str, float]:
+    """A step's operations: those of the compiler that knows most of what is always the same."""
+    same = ("problem", "method", "contestant")
+    alike = [other for other in rows if all(other[key] == row[key] for key in same)]
+    counts = ("flops_per_step", "slots_per_step", "products_per_step")
+    return {count: min(other[count] for other in alike) for count in counts}
+
+
+def _shares(row: Mapping[str, Any]) -> dict[str, Any]:
+    """The row's counts, its share of the peak and its bound."""
+    peak = row["peak_flops"] * row["threads"]
+    return {
+        **row,
+        "share_of_peak": row["steps_per_second"] * row["flops_per_step"] / peak,
+        "bound": bound(row),
+    }
 
 
 def bound(row: Mapping[str, Any]) -> float | None:
