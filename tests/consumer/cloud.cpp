@@ -28,7 +28,7 @@ int main() {
 
   std::vector<decltype(one)::State> members;
   for (std::uint64_t k = 0; k < 20'000; ++k) {
-    hamotor::MemberNumbers numbers(1, k, 7);  // the seed, whose, and how many each takes
+    hamotor::MemberNumbers numbers(1, k, 6);  // the seed, whose, and how many each takes
     const auto [s, e23, e31, e12] = numbers.rotor();
     const double spin = numbers.normal(2, 0.5);
     const double tilt = numbers.uniform(-1, 1);

@@ -26,7 +26,7 @@ from hamotor.run.account import account
 from hamotor.run.ensemble import CHUNK, PART, Job, Part, Tally
 from hamotor.run.ensemble_files import EnsembleFiles
 from hamotor.run.ensemble_run import EnsembleFailed, EnsembleInterrupted, EnsembleRun, run_ensemble
-from hamotor.run.library import SceneLibrary
+from hamotor.run.library import Rows, SceneLibrary
 from hamotor.run.sampling import starts
 from hamotor.run.simulation import Simulation
 from hamotor.run.statistics import Moments
@@ -580,7 +580,7 @@ def test_an_ensemble_steps_like_single_runs(bounce: Simulation) -> None:
         with library.start("rk4", step=0.005, state=states[member]) as live:
             live.advance(20, 0, None)
             assert (live.state() == run.states[member]).all()
-    assert "19 members, given states, 20 steps of 0.005 s" in run.summary()
+    assert "19 members, given states and parameters, 20 steps of 0.005 s" in run.summary()
 
 
 def test_parameters_and_states_of_ones_own_take_the_place_of_drawn_ones(bounce: Simulation) -> None:
@@ -594,7 +594,6 @@ def test_parameters_and_states_of_ones_own_take_the_place_of_drawn_ones(bounce: 
         run_ensemble(bounce, states=states, parameters=own, end=0.5),
     ):
         assert (run.states == drawn.states).all()
-    assert run.report["ensemble"]["seed"] is None
     other = {"2.stiffness": 2 * own["2.stiffness"]}
     found = run_ensemble(bounce, parameters=other, seed=4, end=0.5)
     assert (found.states != drawn.states).any(axis=1).all()
@@ -618,8 +617,36 @@ def test_parameters_of_ones_own_that_do_not_fit_are_refused(
 ) -> None:
     with pytest.raises(UsageError, match=message):
         run_ensemble(bounce, parameters=own)
-    with pytest.raises(UsageError, match=r"there is no member|one member by giving its alone"):
+
+
+def test_parameters_are_given_by_name_and_for_all_members(bounce: Simulation) -> None:
+    with pytest.raises(UsageError, match="one member by giving its alone"):
         run_ensemble(bounce, parameters={"2.stiffness": [1, 2]}, member=1)
+    with pytest.raises(UsageError, match="must be given by name"):
+        run_ensemble(bounce, parameters=np.ones((7, 2)))  # type: ignore[arg-type]
+
+
+def test_a_report_says_what_was_given_and_names_the_seed_of_what_was_drawn(
+    tmp_path: Path,
+) -> None:
+    text = BOUNCE.replace("{ values = [-9.0, -1.62, 0] }", "{ low = -9, high = 0 }")
+    (tmp_path / "s.toml").write_text(text)
+    bounce = hamotor.load(tmp_path / "s.toml")
+    states = np.tile(bounce.state, (3, 1))
+    some = {"2.stiffness": [50, 60, 70]}
+
+    def said(seed: int, **own: Any) -> tuple[object, object, Rows]:
+        run = run_ensemble(bounce, 3, seed=seed, end=0.05, **own)
+        assert ("given" in run.summary()) == bool(own)
+        return run.report["ensemble"]["seed"], run.report["ensemble"]["given"], run.states
+
+    for own in ({"states": states, "parameters": some}, {"parameters": some}):
+        one, other = said(1, **own), said(2, **own)
+        assert (one[0], one[1]) == (1, list(own))
+        assert (one[2] != other[2]).any(axis=1).all()
+    whole = some | {"1.acceleration_z": [0, -1, -2]}
+    assert said(1, parameters=whole)[:2] == (None, ["parameters"])
+    assert said(1)[:2] == (1, [])
 
 
 def test_the_scenes_local_tolerance_is_the_ensembles(bounce: Simulation) -> None:

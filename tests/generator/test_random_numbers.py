@@ -9,7 +9,7 @@ from statistics import NormalDist
 import mpmath
 import numpy as np
 
-from hamotor.run.random_numbers import cosine_and_sine, logarithm, normals, uniforms
+from hamotor.run.random_numbers import cosine_and_sine, logarithm, normals, uniforms, uniforms_of
 from hamotor.run.sampling import starts
 from hamotor.scene.draws import BodyDraws, Draw, Ensemble, Turn
 
@@ -23,6 +23,11 @@ def test_a_members_numbers_do_not_depend_on_the_range_that_is_drawn() -> None:
         assert (uniforms(7, first, members, 6) == whole[first : first + members]).all()
     assert (uniforms(8, 0, 50, 6) != whole).all()
     assert ((whole > 0) & (whole < 1)).all()
+
+
+def test_no_number_is_0_or_1() -> None:
+    ends = uniforms_of(np.array([0, 2**64 - 1], dtype=np.uint64))
+    assert ends.tolist() == [2.0**-54, 1 - 2.0**-53]
 
 
 def test_the_numbers_of_a_seed_are_pinned() -> None:

@@ -59,9 +59,15 @@ TEST(MemberNumbers, begin_at_counters_of_two_words) {
   const auto second = hamotor::philox4x64({0, 2, 0, 0}, {7, 0});
   for (const auto& words : {first, second}) {
     for (const std::uint64_t word : words) {
-      EXPECT_EQ(numbers.uniform(), (static_cast<double>(word >> 11) + 0.5) * 0x1p-53);
+      EXPECT_EQ(numbers.uniform(), hamotor::uniform_of(word));
     }
   }
+}
+
+TEST(MemberNumbers, are_neither_0_nor_1) {
+  EXPECT_EQ(hamotor::uniform_of(0), 0x1p-54);
+  EXPECT_EQ(hamotor::uniform_of(~std::uint64_t{0}), 1 - 0x1p-53);
+  EXPECT_NEAR(hamotor::normal_of(hamotor::uniform_of(~std::uint64_t{0})), 8.2, 0.1);
 }
 
 TEST(MemberNumbers, are_spread_as_they_should_be) {

@@ -126,8 +126,8 @@ def _shares(row: Mapping[str, Any]) -> dict[str, Any]:
 def bound(row: Mapping[str, Any]) -> float | None:
     """Steps a second if the processor started an instruction wherever it can.
 
-    Where additions have units of their own those that multiply can be what takes longest, elsewhere
-    it is all of them together.  None where instructions were not counted.
+    Where additions have units of their own those that multiply take longest (these steps have more
+    of them), elsewhere it is all of them together.  None where instructions were not counted.
     """
     if not row["slots_per_step"]:
         return None

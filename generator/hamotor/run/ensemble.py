@@ -45,7 +45,7 @@ DRAWN = 2000
 _MOST_STATISTICS = 1 << 22
 
 
-OWN = ("given", "parameters")
+OWN = ("states", "parameters")
 """What a `Job` has of the user's own, an array each."""
 
 
@@ -70,10 +70,10 @@ class Job:
     """Members whose rows are kept."""
     tolerance: float | None = None
     """The local error per second of a method that chooses its steps, member by member."""
-    given: Rows | None = field(default=None, compare=False)
+    states: Rows | None = field(default=None, compare=False)
     """States of the user's own, shape (members, state_size), in place of drawn ones."""
     parameters: Rows | None = field(default=None, compare=False)
-    """The same of parameters, shape (members, parameters)."""
+    """The same of parameters, shape (members, parameters); columns that are drawn are NaN."""
 
     @property
     def parts(self) -> int:
@@ -87,22 +87,27 @@ class Job:
 
     def starts(self, first: int, members: int) -> tuple[Rows, Rows | None]:
         """The states at which these members start, and their parameters: None for the scene's."""
-        states, parameters = np.empty((members, 0)), None
-        if self.is_drawn:
-            states, parameters = starts(
-                self.ensemble, np.array(self.own), self.seed, first, members
-            )
         mine = slice(first - self.first, first - self.first + members)
-        if self.given is not None:
-            states = self.given[mine]
-        if self.parameters is not None:
-            parameters = self.parameters[mine]
+        own = None if self.parameters is None else self.parameters[mine]
+        if self.states is not None and not self.draws_parameters:
+            return self.states[mine], own
+        states, parameters = starts(self.ensemble, np.array(self.own), self.seed, first, members)
+        if self.states is not None:
+            states = self.states[mine]
+        if own is not None:
+            parameters = np.where(np.isnan(own), parameters, own)
         return states, parameters if self.ensemble.parameters else None
 
     @property
+    def draws_parameters(self) -> bool:
+        """Whether some are not given."""
+        own = self.parameters
+        return bool(self.ensemble.parameters) and (own is None or bool(np.isnan(own[0]).any()))
+
+    @property
     def is_drawn(self) -> bool:
-        """Whether anything is: not all of it was given."""
-        return self.given is None or (self.parameters is None and bool(self.ensemble.parameters))
+        """Whether anything is drawn: a seed then counts."""
+        return self.draws_parameters or (self.states is None and bool(self.ensemble.bodies))
 
     def sampled(self, columns: int) -> int:
         """How many members, from the first, quantiles and the picture are of."""

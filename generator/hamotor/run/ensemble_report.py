@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hamotor.run.build import CompiledScene
-from hamotor.run.ensemble import CHUNK, Job, Tally
+from hamotor.run.ensemble import CHUNK, OWN, Job, Tally
 from hamotor.run.library import Description
 from hamotor.run.report import Report
 from hamotor.run.runner import Plan
@@ -93,6 +93,7 @@ def ensemble_report(
             "first": job.first,
             **counts,
             "seed": job.seed if job.is_drawn else None,
+            "given": [name for name in OWN if getattr(job, name) is not None],
             "random_numbers": "Philox4x64-10",
             "random_numbers_each": numbers_each(job.ensemble) if job.is_drawn else 0,
             "chunk": CHUNK,
@@ -161,7 +162,9 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
     who = f"{many['members']:,} members"
     if many["members"] == 1:
         who = f"member {many['first']:,} alone"
-    seed = "given states" if many["seed"] is None else f"seed {many['seed']}"
+    given = " and ".join(many.get("given", []))
+    seed = "" if many["seed"] is None else f"seed {many['seed']}"
+    start = ", ".join(filter(None, (seed, given and f"given {given}")))
     where = f"{many['threads']} thread{'s' * (many['threads'] != 1)}"
     what = (
         f"{said['scene']} · {said['group']} in {said['algebra']} · {said['method']} "
@@ -173,7 +176,7 @@ def ensemble_summary(said: Mapping[str, Any], *, folder: Path | None = None) -> 
         f"({'dask' if many['engine'] == 'dask' else where}, "
         f"{many['lanes']} lane{'s' * (many['lanes'] != 1)}, {many['isa']})"
     )
-    lines = [what, f"  {who}, {seed}, {steps}", speed]
+    lines = [what, f"  {who}, {start}, {steps}", speed]
     if said["method_reason"]:
         lines.append(f"  {said['method']} because {said['method_reason']}")
     if said["status"] != "finished":

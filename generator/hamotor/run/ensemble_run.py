@@ -35,7 +35,6 @@ from hamotor.run.progress import NoProgress, PrintedProgress, Progress
 from hamotor.run.random_numbers import MOST_SEEDS
 from hamotor.run.report import Report, to_json
 from hamotor.run.runner import Interruption, Plan, plan, refuse_impossible_span
-from hamotor.run.sampling import starts
 from hamotor.run.simulation import ROWS, Compiled, Simulation, at_interval, load
 from hamotor.run.statistics import quantiles
 from hamotor.scene.draws import quantile_name
@@ -237,7 +236,7 @@ def run_ensemble(
     members, member = _whole("members", members), _whole("member", member)
     threads, seed = _whole("threads", threads), _whole("seed", seed)
     given = None if states is None else _as_numbers("states", states)
-    own = _as_parameters(simulation, parameters or {})
+    own = {} if parameters is None else _as_parameters(simulation, parameters)
     chosen, reason = method or simulation.method, ""
     if offered := simulation.offered_to_ensembles:
         if method is None and chosen not in offered:
@@ -304,8 +303,8 @@ def run_ensemble(
         members=count,
         keep=tuple(k for k in kept if first <= k < first + count),
         tolerance=local_tolerance,
-        given=given,
-        parameters=_with_drawn(simulation, seed, count, own),
+        states=given,
+        parameters=_columns(simulation, count, own),
     )
     refuse_impossible(compiled.library, job)
     deadline = math.inf if time_limit is None else time.perf_counter() + time_limit
@@ -547,8 +546,10 @@ def _as_numbers(name: str, values: object) -> Array:
         raise UsageError(f"{name} must be an array of real numbers: {problem}.") from None
 
 
-def _as_parameters(simulation: Simulation, given: Mapping[str, object]) -> dict[str, Array]:
+def _as_parameters(simulation: Simulation, given: object) -> dict[str, Array]:
     """A finite number for each member, by the parameter's name."""
+    if not isinstance(given, Mapping):
+        raise UsageError('parameters must be given by name: {"k": a number for each member}.')
     names = [parameter.name for parameter in simulation.ensemble.parameters]
     found = {}
     for name, values in given.items():
@@ -569,17 +570,13 @@ def _as_parameters(simulation: Simulation, given: Mapping[str, object]) -> dict[
     return found
 
 
-def _with_drawn(
-    simulation: Simulation, seed: int, members: int, given: Mapping[str, Array]
-) -> Rows | None:
-    """All parameters, shape (members, parameters): those that are not given are drawn."""
+def _columns(simulation: Simulation, members: int, given: Mapping[str, Array]) -> Rows | None:
+    """Parameters, shape (members, parameters): NaN where they are not given; None for none."""
     if not given:
         return None
-    rows = starts(simulation.ensemble, np.array(simulation.state), seed, 0, members)[1]
-    for k, parameter in enumerate(simulation.ensemble.parameters):
-        if parameter.name in given:
-            rows[:, k] = given[parameter.name]
-    return rows
+    undrawn = np.full(members, np.nan)
+    names = [parameter.name for parameter in simulation.ensemble.parameters]
+    return np.column_stack([given.get(name, undrawn) for name in names])
 
 
 def _range(

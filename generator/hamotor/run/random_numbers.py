@@ -23,14 +23,19 @@ _WORDS_PER_BLOCK = 4
 def uniforms(seed: int, first: int, members: int, each: int) -> Array:
     """Numbers uniform in (0, 1), `each` for every member from `first`: shape (members, each).
 
-    Odd multiples of 2⁻⁵⁴: neither 0 nor 1.  0 ≤ seed < 2⁶⁴, 0 ≤ first.
+    0 ≤ seed < 2⁶⁴, 0 ≤ first.
     """
     blocks = -(-each // _WORDS_PER_BLOCK)
     generator = np.random.Philox(key=seed, counter=first * blocks)
     words = generator.random_raw(members * blocks * _WORDS_PER_BLOCK)
     kept = words.reshape(members, blocks * _WORDS_PER_BLOCK)[:, :each]
-    found: Array = ((kept >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
-    return found
+    return uniforms_of(kept)
+
+
+def uniforms_of(words: NDArray[np.uint64]) -> Array:
+    """The number in (0, 1) of each word: the middle of one of 2⁵³ parts, rounded."""
+    found: Array = ((words >> np.uint64(11)).astype(np.float64) + 0.5) * 2.0**-53
+    return np.minimum(found, 1.0 - 2.0**-53, out=found)
 
 
 # Wichura, Algorithm AS 241 (PPND16), Applied Statistics 37 (1988) 477: numerators and denominators,

@@ -134,6 +134,13 @@ template <class Momentum, class Rate>
       [&] { return Ad_star(exp(x), mu) - mu; });
 }
 
+/// Puts zeros where a condition does not hold.
+template <class Change, class Condition>
+constexpr void keep_where(Change& change, const Condition& condition) noexcept {
+  for (auto& motor : change.motors) motor = select_each(condition, motor, {});
+  for (auto& momentum : change.momenta) momentum = select_each(condition, momentum, {});
+}
+
 }  // namespace detail
 
 /// What a state's numbers do not hold of it: a sum over steps is then rounded as if in twice the
@@ -171,9 +178,7 @@ class LowDigits {
   template <class Condition>
   constexpr void keep_where(const Condition& condition) noexcept {
     if constexpr (summation == Summation::compensated) {
-      if (all(condition)) return;
-      for (auto& motor : kept_.motors) motor = select_each(condition, motor, {});
-      for (auto& momentum : kept_.momenta) momentum = select_each(condition, momentum, {});
+      if (!all(condition)) detail::keep_where(kept_, condition);
     }
   }
 

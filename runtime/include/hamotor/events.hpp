@@ -23,7 +23,7 @@ template <class S>
 template <class System, class Method, class States, class S>
 [[nodiscard]] constexpr States part_of_step(const System& system, Method method, States start,
                                             const S& t, const S& part) noexcept {
-  go_on(method, system, start, t, part);
+  method.do_step(system, start, t, part);
   return start;
 }
 

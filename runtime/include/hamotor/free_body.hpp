@@ -694,7 +694,7 @@ class ClosedForm {
   /// Takes `state` from t to t + h.
   constexpr void do_step(const System& system, StateOf<System>& state, const S& t,
                          const S& h) noexcept {
-    if (!(motions_ && state == delivered_ && is_delivered(t))) {
+    if (!(motions_ && state == delivered_ && is_delivered(t, h))) {
       motions_ = from(system, state, std::make_index_sequence<n>{});
       start_ = t;
     }
@@ -727,9 +727,9 @@ class ClosedForm {
   }
 
   /// Times that differ by rounding are the same.
-  [[nodiscard]] constexpr bool is_delivered(const S& t) const noexcept {
-    const S slack = S(8) * scalar::Limits<S>::epsilon() * scalar::max_abs(t, delivered_time_);
-    return scalar::abs(t - delivered_time_) <= slack;
+  [[nodiscard]] constexpr bool is_delivered(const S& t, const S& h) const noexcept {
+    const S size = scalar::max_abs(scalar::max_abs(t, delivered_time_), h);
+    return scalar::abs(t - delivered_time_) <= S(8) * scalar::Limits<S>::epsilon() * size;
   }
 
   std::optional<Motions> motions_;

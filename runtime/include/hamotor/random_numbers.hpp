@@ -6,6 +6,7 @@
 // differ.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cassert>
 #include <cmath>
@@ -107,6 +108,11 @@ template <std::size_t n>
   return counter;
 }
 
+/// The number in (0, 1) of a word whose bits are random: the middle of one of 2⁵³ parts, rounded.
+[[nodiscard]] constexpr double uniform_of(std::uint64_t word) noexcept {
+  return std::min((static_cast<double>(word >> 11) + 0.5) * 0x1p-53, 1 - 0x1p-53);
+}
+
 /// The standard normal number of a uniform one in (0, 1): the inverse of the distribution.
 ///
 /// Relative error some 1e-15: Wichura, Algorithm AS 241 (PPND16), Applied Statistics 37 (1988) 477.
@@ -167,7 +173,7 @@ class MemberNumbers {
     counter_ = {low, high, 0, 0};
   }
 
-  /// Uniform in (0, 1): an odd multiple of 2⁻⁵⁴.
+  /// Uniform in (0, 1).
   [[nodiscard]] constexpr double uniform() noexcept {
     assert(left_ > 0 && "a member takes no more numbers than MemberNumbers was told");
     --left_;
@@ -176,7 +182,7 @@ class MemberNumbers {
       words_ = philox4x64(counter_, {seed_, 0});
       next_ = 0;
     }
-    return (static_cast<double>(words_[next_++] >> 11) + 0.5) * 0x1p-53;
+    return uniform_of(words_[next_++]);
   }
   [[nodiscard]] constexpr double uniform(double low, double high) noexcept {
     return low + (high - low) * uniform();

@@ -686,6 +686,9 @@ class Run {
             }
           }
           auto aside = unhurried(method);
+          if constexpr (requires { aside.forget(); }) {
+            if (failure_ != Failure::none) aside.forget();  // the step that failed left another
+          }
           go_on(aside, Scene::system, there.state, now(), part);
           there.work = work_of(aside);
           return observe(there, row);

@@ -296,8 +296,8 @@ concept Stepper = HamiltonianSystem<System> && std::default_initializable<Method
                     { method.drift() } -> std::convertible_to<Drift<typename System::Scalar>>;
                   };
 
-/// A step of who changes no state between steps: steppers that would look whether it is the one
-/// that their last step left do not.
+/// A step of a new method, or from the state that its last step left: methods that would look
+/// whether it is that one do not.
 template <class System, Stepper<System> Method>
 HAMOTOR_INLINE constexpr void go_on(Method& method, const System& system, StateOf<System>& state,
                                     const typename System::Scalar& t,

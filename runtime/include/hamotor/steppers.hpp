@@ -796,8 +796,8 @@ class Rk4 : public detail::ExplicitMethod<System, summation> {
     }
   }
 
-  /// The same for who changes no state between steps, which is then not compared; other steps may
-  /// follow after `forget`.
+  /// The same of a new stepper, or from the state that its last step left, which is not compared
+  /// with that.  `do_step` does not know of these steps: before it, `forget`.
   constexpr void go_on(const System& system, StateOf<System>& state, const S& t,
                        const S& h) noexcept {
     go_on(Plan(system, h), state, t);
@@ -926,8 +926,8 @@ class Splitting {
     if constexpr (keeps_any) left_ = state;
   }
 
-  /// The same for who changes no state between steps, which is then not compared; other steps may
-  /// follow after `forget`.
+  /// The same of a new stepper, or from the state that its last step left, which is not compared
+  /// with that.  `do_step` does not know of these steps: before it, `forget`.
   [[gnu::flatten]] constexpr void go_on(const System& system, StateOf<System>& state,
                                         const S& /*t*/, const S& h) noexcept {
     if constexpr (takes_whole_steps) {
@@ -1047,7 +1047,7 @@ class Splitting {
 
  private:
   struct Nothing {};
-  struct NothingLeft {};
+  struct NothingLeft {};  // members of one empty type would each have an address
   struct KnownForque {
     bool any = false;
     Momenta forque{};
@@ -1064,11 +1064,8 @@ class Splitting {
   constexpr void take_up(const System& system, const StateOf<System>& state) noexcept {
     const auto same = are_same(state, left_);
     if (all(same)) return;
-    if constexpr (compensated) {
-      for (auto& low : low_.motors) low = select_each(same, low, {});
-      for (auto& low : low_.momenta) low = select_each(same, low, {});
-    }
-    if constexpr (System::has_forque) {
+    if constexpr (compensated) detail::keep_where(low_, same);
+    if constexpr (opens_with_kick && !takes_whole_steps) {
       if (!any(same)) known_.any = false;
       if (!known_.any) return;
       note_evaluations<S>(1);

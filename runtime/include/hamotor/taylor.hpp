@@ -171,6 +171,7 @@ class Taylor {
     failure_ = reason;
     for (auto& mu : state.momenta) mu = S(std::numeric_limits<double>::quiet_NaN()) * mu;
     known_ = false;
+    paused_ = false;
   }
 
   constexpr void start(const StateOf<System>& state, const S& t) noexcept {
