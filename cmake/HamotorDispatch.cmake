@@ -20,12 +20,11 @@
 
 include_guard(GLOBAL)
 
-# With the options for the compilers, and what __builtin_cpu_supports has to find for it.  Options
-# also take back what the project's own name; -march=x86-64, before them, does so with processors.
+# With the options for the compilers, and what __builtin_cpu_supports has to find for it.
 macro(hamotor_instruction_sets)
-  set(HAMOTOR_ISA_sse2_OPTIONS -mno-sse3 -mno-popcnt -mno-lzcnt -mno-bmi -mno-bmi2)
+  set(HAMOTOR_ISA_sse2_OPTIONS "")
   set(HAMOTOR_ISA_sse2_FEATURES "")
-  set(HAMOTOR_ISA_avx2_OPTIONS -mno-avx512f -mavx2 -mfma -mbmi -mbmi2)
+  set(HAMOTOR_ISA_avx2_OPTIONS -mavx2 -mfma -mbmi -mbmi2)
   set(HAMOTOR_ISA_avx2_FEATURES avx2 fma bmi bmi2)
   set(HAMOTOR_ISA_avx512_OPTIONS ${HAMOTOR_ISA_avx2_OPTIONS} -mavx512f -mavx512cd -mavx512bw
                                  -mavx512dq -mavx512vl)
@@ -91,8 +90,10 @@ function(hamotor_dispatch target)
   endif()
 
   hamotor_instruction_sets()
-  # What is bytecode has no symbols to hide.
-  set(bare -march=x86-64 -fno-lto $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-fno-whole-program-vtables>)
+  # Nothing of what the project's options say of processors, -mno-sse3 including all AVX; and what is
+  # bytecode has no symbols to hide.
+  set(bare -march=x86-64 -mno-sse3 -mno-popcnt -mno-lzcnt -mno-bmi -mno-bmi2 -fno-lto
+           $<$<COMPILE_LANG_AND_ID:CXX,Clang>:-fno-whole-program-vtables>)
   # A target may have several calls; they are known by their first functions.
   list(GET arg_FUNCTIONS 0 first)
   set(parts ${target}_${first})
@@ -101,8 +102,7 @@ function(hamotor_dispatch target)
   # Its own library: neither warnings nor optimisation of the target are for what is written here.
   add_library(${parts}_dispatcher OBJECT EXCLUDE_FROM_ALL "${folder}/dispatcher.cpp")
   target_compile_features(${parts}_dispatcher PRIVATE cxx_std_17)
-  target_compile_options(${parts}_dispatcher PRIVATE -w -masm=att ${bare}
-                                                     ${HAMOTOR_ISA_sse2_OPTIONS})
+  target_compile_options(${parts}_dispatcher PRIVATE -w -masm=att ${bare})
   set_target_properties(${parts}_dispatcher PROPERTIES POSITION_INDEPENDENT_CODE ON
                                                        INTERPROCEDURAL_OPTIMIZATION OFF
                                                        CXX_CLANG_TIDY "")
@@ -116,15 +116,18 @@ function(hamotor_dispatch target)
     add_dependencies(${objects} ${parts}_sources)
     set_target_properties(${objects} PROPERTIES POSITION_INDEPENDENT_CODE ON UNITY_BUILD OFF
                                                 INTERPROCEDURAL_OPTIMIZATION OFF)
+    # Linked last, so that its options come after all others; in one, as CMake drops what it has seen.
+    # Nobody can put functions of his own in place of what is hidden.
+    add_library(${objects}_options INTERFACE)
+    string(JOIN " " options ${bare} ${HAMOTOR_ISA_${isa}_OPTIONS} -fno-semantic-interposition
+                            $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fno-gnu-unique>)
+    target_compile_options(${objects}_options INTERFACE "SHELL:${options}")
     foreach(property INCLUDE_DIRECTORIES COMPILE_DEFINITIONS COMPILE_OPTIONS COMPILE_FEATURES
                      LINK_LIBRARIES PRECOMPILE_HEADERS)
       set_property(TARGET ${objects} PROPERTY ${property}
                                               "$<TARGET_PROPERTY:${target},${property}>")
     endforeach()
-    # After the target's own.  Nobody can put functions of his own in place of what is hidden.
-    target_compile_options(${objects} PRIVATE ${bare} ${HAMOTOR_ISA_${isa}_OPTIONS}
-                                              -fno-semantic-interposition
-                                              $<$<COMPILE_LANG_AND_ID:CXX,GNU>:-fno-gnu-unique>)
+    target_link_libraries(${objects} PRIVATE ${objects}_options)
 
     # Inline functions are the same by name and not by instructions: the linker would take any.
     set(joined "${folder}/${isa}-$<CONFIG>-joined.o")
